@@ -8,7 +8,7 @@ from ferryid.diagnose.judging.diagnosis import SCHEMA, Diagnosis, Withheld, find
 from ferryid.diagnose.judging.error_profiles import Profiled
 from ferryid.diagnose.judging.finding import UNKNOWN, Finding
 from ferryid.diagnose.judging.group_differences import Difference
-from ferryid.diagnose.judging.likeness import Likeness, Pair
+from ferryid.diagnose.judging.likeness import Likeness, Pair, likeness_as_json, separation
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.judging.verdict import campaign_verdict, error_ratio, worse_axes
 from ferryid.diagnose.parallel import keep_to_one_thread
@@ -43,6 +43,8 @@ __all__ = [
     "error_ratio",
     "finding_as_json",
     "keep_to_one_thread",
+    "likeness_as_json",
+    "separation",
     "to_json",
     "versus_json",
     "worse_axes",

@@ -34,6 +34,7 @@ def render(
     together = second_sources.of_all(diagnoses)
     logs = [_log(one, f"{k}-" if several else "", k <= MAX_LOGS, shared, common) for k, one in enumerate(diagnoses, 1)]
     left = [one.log for one in diagnoses[MAX_LOGS:]]
+    of_all = likeness.section(diagnoses[0].likeness_of_all, "likeness", "these logs together")
     page = template("diagnosis.html").render(
         title=title,
         verdict=campaign_verdict([one.verdict for one in diagnoses]),
@@ -41,6 +42,7 @@ def render(
         several=several,
         logs=logs,
         common=[_finding(one, f"all-finding-{k}", False, ()) for k, one in enumerate(common, 1)],
+        likeness=of_all,
         sign=diagnosis_words.SIGN,
         made=made,
         shared_notes=shared,
@@ -55,10 +57,11 @@ def render(
         for figure in (
             *log["figures"],
             *log["free_run_figures"],
-            *log["likeness"].get("figures", ()),
             *(one for finding in log["findings"] for one in finding["figures"]),
+            *log["likeness"].get("figures", ()),
         )
     }
+    drawings |= {figure["file"]: figure["svg"] for figure in of_all.get("figures", ())}
     return page, drawings
 
 
@@ -87,14 +90,16 @@ def as_text(diagnoses: Sequence[Diagnosis]) -> str:
                 lines.append(f"{row['name']:<44}" + "".join(f"{cell:>22}" for cell in row["cells"][: len(names)]))
         hidden = [f"withheld {one_hidden.signal}: {one_hidden.says}" for one_hidden in one.withheld]
         remarks = [*hidden, *(f"note: {note}" for note in diagnosis_words.notes_of(one, shared))]
-        remarks += filter(None, [likeness.line(one.likeness)])
+        if one.likeness_of_all is None:
+            remarks += [f"note: {note}" for note in likeness.notes(one.likeness, "this log")]
         remarks += [] if together else second_sources.lines(one.sources)
         remarks += second_sources.repair_lines(one)
         lines += ["", *remarks] if remarks else []
         lines += ["", diagnosis_words.new_model(one)] if one.model and len(diagnoses) == 1 else [""]
         blocks.append("\n".join(_folded(line) for line in lines))
-    if shared:
-        blocks.append("\n".join(_folded(f"note on all logs: {note}") for note in shared))
+    about_all = [*shared, *likeness.notes(diagnoses[0].likeness_of_all, "these logs together")]
+    if about_all:
+        blocks.append("\n".join(_folded(f"note on all logs: {note}") for note in about_all))
     if together and (instruments := second_sources.lines(together)):
         blocks.append("\n".join(_folded(line) for line in instruments))
     if model := diagnosis_words.model_of_all(diagnoses):
@@ -177,7 +182,10 @@ def _log(
         "notes": diagnosis_words.notes_of(diagnosis, told),
         "sources": second_sources.section(diagnosis.sources),
         "repairs": second_sources.repairs(diagnosis),
-        "likeness": likeness.section(diagnosis.likeness, f"{prefix}likeness", drawn),
+        # Of a campaign that of all logs is shown; the JSON has each log's own.
+        "likeness": {}
+        if diagnosis.likeness_of_all is not None
+        else likeness.section(diagnosis.likeness, f"{prefix}likeness", "this log", drawn=drawn),
         "drawn": drawn and any(one.evidence for one in diagnosis.findings),
         "fitted": diagnosis_errors.fitted(diagnosis),
         "about_errors": diagnosis_words.about_errors(diagnosis),

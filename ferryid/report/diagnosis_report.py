@@ -18,6 +18,7 @@ from ferryid.diagnose import (
     campaign_verdict,
     diagnose_and_store,
     finding_as_json,
+    likeness_as_json,
     to_json,
 )
 from ferryid.errors import FerryIdError
@@ -156,6 +157,9 @@ def as_json(diagnoses: Sequence[Diagnosis]) -> dict[str, Any]:
         "withheld": [],
         **({"second_sources": together.to_json()} if together else {}),
         **({} if diagnoses[0].learned is None else {"learned": diagnoses[0].learned.to_json()}),
+        **(
+            {} if diagnoses[0].likeness_of_all is None else {"likeness": likeness_as_json(diagnoses[0].likeness_of_all)}
+        ),
         # What several logs teach is one model.
         "model": next((one.model for one in diagnoses if one.model), None),
         "logs": [{key: value for key, value in one.items() if key != "schema"} for one in logs],

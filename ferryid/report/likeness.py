@@ -1,4 +1,4 @@
-"""How alike the effects look in a log: a heat map, and the pairs that the log hardly separates, as words."""
+"""How alike the effects look in logs: a heat map, and the pairs that look alike in words."""
 
 from __future__ import annotations
 
@@ -7,106 +7,144 @@ from typing import Any
 import matplotlib as mpl
 
 from ferryid.counts import counted
-from ferryid.diagnose import Likeness, Pair
+from ferryid.diagnose import Likeness, Pair, separation
 from ferryid.effects.wording import listed
 from ferryid.report.figures import MEASURED, STYLE, WIDTH, margins, svg_text
 
-CELL, NAMES, BAR, BELOW = 0.27, 2.55, 0.75, 0.3
-"""Inches of a cell, of the names beside the map, of the scale and its label, and of the numbers below."""
-WRITTEN = 0.3
-"""Likeness from which a cell shows its number."""
-DARK = 0.6
-"""Likeness above which the ground of a cell is dark, and its number white."""
+CELL, NAMES, BAR = 0.27, 2.9, 0.7
+"""Inches of a cell at most, of the names beside the map, and of the scale with its label."""
+WRITTEN, DARK = 0.3, 0.6
+"""Likeness from which a cell shows its number, and above which that is white on a dark ground."""
 IN_TEXT = 5
 """Pairs that the text for a terminal names; the page has all."""
 
 
 def heat_map(likeness: Likeness) -> str:
-    """Draw the likeness of every two effects, with how visible each is."""
-    effects, q = likeness.effects, len(likeness.effects)
+    """Draw the likeness of every two effects, alike ones beside each other; behind each name how visible it is."""
+    effects, n = likeness.effects, len(likeness.effects)
+    side = min(CELL * n, WIDTH - NAMES - BAR - 0.1)
+    bottom, top = 0.35, 0.1
+    height = side + bottom + top
     with mpl.rc_context({**STYLE, "axes.grid": False}):
-        height = BELOW + CELL * max(q, 6) + 0.1
-        figure = margins(height, left=NAMES)
-        ax = figure.add_axes(
-            (NAMES / WIDTH, BELOW / height, (WIDTH - NAMES - BAR - 0.1) / WIDTH, CELL * max(q, 6) / height)
-        )
+        figure = margins(height)
+        ax = figure.add_axes((NAMES / WIDTH, bottom / height, side / WIDTH, side / height))
         mesh = ax.pcolormesh(likeness.matrix, cmap="Blues", vmin=0.0, vmax=1.0, edgecolors="white", linewidth=0.6)
-        for i in range(q):
-            for j in range(q):
+        size = 72.0 * side / n
+        for i in range(n):
+            for j in range(n):
                 value = float(likeness.matrix[i, j])
                 if i != j and value >= WRITTEN:
-                    colour = "white" if value > DARK else MEASURED
+                    # "1" would claim what no log shows.
                     text = f"{min(value, 0.99):.2f}".lstrip("0")
-                    ax.text(j + 0.5, i + 0.5, text, ha="center", va="center", color=colour, fontsize=6)
-        places = [k + 0.5 for k in range(q)]
-        ax.set_yticks(places, [f"{k}  {one.title}, {_size(one.visibility)}" for k, one in enumerate(effects, 1)])
-        ax.set_xticks(places, [str(k) for k in range(1, q + 1)])
-        ax.tick_params(length=0, labelsize=8)
+                    colour = "white" if value > DARK else MEASURED
+                    ax.text(
+                        j + 0.5, i + 0.5, text, ha="center", va="center", color=colour, fontsize=min(7.0, 0.45 * size)
+                    )
+        places = [k + 0.5 for k in range(n)]
+        font = min(8.0, 0.75 * size)
+        ax.set_yticks(
+            places, [f"{one.title} · {_size(one.signal_to_noise)} σ  {k}" for k, one in enumerate(effects, 1)]
+        )
+        ax.set_xticks(places, [str(k) for k in range(1, n + 1)])
+        ax.tick_params(length=0, labelsize=font)
+        ax.tick_params(axis="x", labelsize=min(font, 0.42 * size))
+        for label, one in zip(ax.get_yticklabels(), effects, strict=True):
+            label.set_color(MEASURED if one.visible else "#888888")
         ax.invert_yaxis()
-        for side in ax.spines.values():
-            side.set_visible(False)
-        beside = figure.add_axes(((WIDTH - BAR) / WIDTH, BELOW / height, 0.12 / WIDTH, CELL * max(q, 6) / height))
-        figure.colorbar(mesh, cax=beside, label="likeness [-]")
-        beside.tick_params(labelsize=8)
+        for spine in ax.spines.values():
+            spine.set_visible(False)
+        bar = figure.add_axes(((NAMES + side + 0.12) / WIDTH, bottom / height, 0.12 / WIDTH, side / height))
+        figure.colorbar(mesh, cax=bar, label="likeness", ticks=[0.0, 0.5, 1.0])
+        bar.tick_params(labelsize=8)
         return svg_text(figure)
 
 
-def section(likeness: Likeness | None, file: str, drawn: bool) -> dict[str, Any]:
-    """Return what the page shows of it: figures, a sentence and rows of pairs; empty where no two effects can be compared."""
+def section(likeness: Likeness | None, file: str, where: str, *, drawn: bool = True) -> dict[str, Any]:
+    """Return what a page shows of it; empty where no two effects can be compared.
+
+    `where` is "this log" or what else was looked at, for sentences.
+    """
     if likeness is None or len(likeness.effects) < 2:
         return {}
     caption = (
-        "Likeness of what two effects do to the prediction errors of this log, beside a hull whose coefficients are refitted: "
-        "1 cannot be separated, 0 cannot be mistaken. Behind each name: the signal-to-noise ratio of the effect at its usual "
-        "size. Alike ones stand side by side."
+        f"Likeness of what every two effects do to the prediction errors of {where}, after what a refitted hull takes of it: 1 "
+        "where they cannot be told apart, 0 where neither looks like the other at all. Alike ones stand beside each other. "
+        "σ: signal-to-noise ratio of the effect at its usual size; grey where that is too little to be named."
     )
     return {
-        "says": _sentence(likeness),
-        "faint": _faint(likeness),
-        "rows": [
-            {
-                "names": _names(likeness, one),
-                "cells": [f"{one.likeness:.3f}", _size(one.apart)],
-                "record": one.manoeuvre,
-                "measure": one.sensor or "–",
-            }
-            for one in likeness.pairs
-        ],
+        "says": sentences(likeness, where),
+        "rows": [_row(likeness, one) for one in likeness.alike],
         "figures": [{"file": file, "svg": heat_map(likeness), "caption": caption}] if drawn else [],
     }
 
 
-def line(likeness: Likeness | None) -> str:
-    """Return the pairs that a log hardly separates as one sentence for a terminal; empty where there are none."""
-    if likeness is None or not likeness.pairs:
-        return ""
-    pairs = [f"{_names(likeness, one)} ({one.likeness:.3f})" for one in likeness.pairs[:IN_TEXT]]
-    more = len(likeness.pairs) - IN_TEXT
-    pairs += [f"{counted(more, 'other pair')}"] if more > 0 else []
-    return f"Alike in this log (1: cannot be separated): {listed(pairs)}."
+def sentences(likeness: Likeness, where: str) -> list[str]:
+    """Return how many effects look alike, and which could not be seen, as sentences."""
+    count = len(likeness.effects) - len(likeness.hidden)
+    lines = []
+    if count > 1:
+        lines.append(
+            f"Before anything is fitted: of {counted(count, 'effect')} that {where} would show at their usual size, "
+            + (
+                f"{counted(len(likeness.alike), 'pair')} look much alike."
+                if len(likeness.alike) > 1
+                else "one pair looks much alike."
+                if likeness.alike
+                else "no two look much alike."
+            )
+        )
+        apart = [one for one in likeness.alike if not one.resolved]
+        if apart:
+            lines.append(f"{counted(len(apart), 'pair').capitalize()} cannot be told apart at the usual size.")
+    if likeness.hidden:
+        names = listed([_inline(one.title) for one in likeness.hidden])
+        lines.append(f"Too small at their usual size to be named here: {names}.")
+    return lines
 
 
-def _sentence(likeness: Likeness) -> str:
-    effects = counted(len(likeness.effects), "effect")
-    if not likeness.pairs:
-        return f"This log separates every two of the {effects} that it shows at their usual size."
+def notes(likeness: Likeness | None, where: str) -> list[str]:
+    """Return the pairs that look alike as one sentence for a terminal; none where there are none."""
+    if likeness is None or not likeness.alike:
+        return []
+    pairs = [f"{names(likeness, one)} ({_value(one)})" for one in likeness.alike[:IN_TEXT]]
+    more = len(likeness.alike) - IN_TEXT
+    pairs += [counted(more, "other pair")] if more > 0 else []
+    return [f"In {where} these look alike (1: cannot be told apart): {'; '.join(pairs)}."]
+
+
+def names(likeness: Likeness, pair: Pair) -> str:
+    """Return the titles of two effects."""
+    return f"{_inline(likeness.title(pair.first))} and {_inline(likeness.title(pair.second))}"
+
+
+def resolved(pair: Pair) -> str:
+    """Return from which size on two effects are told apart."""
+    if pair.resolved_from is None:
+        return "at no size"
     return (
-        f"Of the {effects} that this log shows at their usual size, it hardly separates "
-        f"{counted(len(likeness.pairs), 'pair')}. What is left is the signal-to-noise ratio of what distinguishes the less "
-        "visible one of the two from the other."
+        f"{pair.resolved_from:.2g} of the usual size"
+        if pair.resolved_from < 1.0
+        else f"{pair.resolved_from:.2g} usual sizes"
     )
 
 
-def _faint(likeness: Likeness) -> str:
-    if not likeness.faint:
-        return ""
-    names = listed([one.title.lower() for one in likeness.faint])
-    return f"Not compared, as noise would hide an effect of usual size: {names}."
+def _row(likeness: Likeness, pair: Pair) -> dict[str, str]:
+    between = separation(pair.first, pair.second)
+    return {
+        "names": names(likeness, pair),
+        "likeness": _value(pair),
+        "from": resolved(pair),
+        "record": between.manoeuvre,
+        "measure": between.sensor or "–",
+    }
 
 
-def _names(likeness: Likeness, pair: Pair) -> str:
-    one, other = (likeness.effects[k].title for k in (pair.first, pair.second))
-    return f"{one.lower()} and {other.lower()}"
+def _value(pair: Pair) -> str:
+    return f"{pair.likeness:.2f}" if pair.likeness < 0.995 else "above 0.99"
+
+
+def _inline(title: str) -> str:
+    return title[:1].lower() + title[1:]
 
 
 def _size(value: float) -> str:

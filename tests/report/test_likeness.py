@@ -1,61 +1,58 @@
-"""How alike effects look, on the page, as a figure, as text and as JSON."""
+"""The likeness of effects on a page: the figure, sentences that agree with it, nothing where nothing can be compared."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-from pathlib import Path
-
 import numpy as np
 
-from ferryid.diagnose.judging.likeness import Likeness, Pair, Seen
-from ferryid.report.diagnosis_page import as_text, render
-from ferryid.report.diagnosis_report import report
-from ferryid.report.likeness import line, section
-from tests.report.test_diagnosis import conforms, diagnosis
+from ferryid.diagnose import Likeness, Pair
+from ferryid.diagnose.judging.likeness import EffectVisibility
+from ferryid.report import likeness
 
-SEEN = (
-    Seen("wind", None, "Steady wind", 120.4, 0.3),
-    Seen("current", None, "Current", 56.0, 0.2),
-    Seen("thruster_gain", "bow", "Thruster force (bow)", 3.25, 0.9),
+EFFECTS = (
+    EffectVisibility("wind", None, "Steady wind", 120.0, 0.1),
+    EffectVisibility("current", None, "Current", 40.0, 0.2),
+    EffectVisibility("payload", None, "Payload", 0.7, 0.9),
 )
-MATRIX = np.array([[1.0, 0.97, 0.1], [0.97, 1.0, 0.45], [0.1, 0.45, 1.0]])
-PAIR = Pair(0, 1, 0.97, 13.6, "a slow turn on the spot", "an anemometer")
-LIKE = Likeness(SEEN, MATRIX, (PAIR,), (Seen("payload", None, "Payload", 0.4, 0.1),))
+PAIRS = (
+    Pair(("wind", None), ("current", None), 0.998, 1.4, alike=True),
+    Pair(("wind", None), ("payload", None), 0.4, 3.8, alike=False),
+    Pair(("current", None), ("payload", None), 0.1, 3.5, alike=False),
+)
+MATRIX = np.array([[1.0, 0.998, 0.4], [0.998, 1.0, 0.1], [0.4, 0.1, 1.0]])
+FOUND = Likeness(EFFECTS, MATRIX, PAIRS)
 
 
-def test_the_page_has_figure_and_pairs_with_what_separates_them() -> None:
-    page, drawings = render((replace(diagnosis("explained"), likeness=LIKE),), "trial")
-    assert "How alike the effects look in this log" in page
-    for shown in ("steady wind and current", "0.970", "14", "a slow turn on the spot", "an anemometer"):
-        assert f">{shown}<" in page
-    assert "noise would hide an effect of usual size: payload." in page
-    drawn = drawings["likeness"]
-    assert "1  Steady wind, 120" in drawn
-    assert "3  Thruster force (bow), 3.2" in drawn
-    # Numbers stand in the cells that are worth one: two of each of two pairs.
-    assert drawn.count(">.97<") == drawn.count(">.45<") == 2
-    assert ">.10<" not in drawn
+def test_the_map_names_every_effect_with_how_visible_it_is() -> None:
+    drawing = likeness.heat_map(FOUND)
+    for text in ("Steady wind · 120 σ  1", "Current · 40 σ  2", "Payload · 0.7 σ  3", "likeness"):
+        assert text in drawing
+    # Each of a pair once, both ways; what is small stays blank, and no log shows a 1.
+    assert drawing.count(">.99<") == 2
+    assert drawing.count(">.40<") == 2
+    assert ">.10<" not in drawing
+    assert ">1.00<" not in drawing
 
 
-def test_without_anything_to_compare_there_is_no_section() -> None:
-    alone = Likeness(SEEN[:1], np.eye(1), ())
-    for nothing in (None, alone):
-        assert section(nothing, "likeness", True) == {}
-        assert line(nothing) == ""
-        assert "How alike" not in render((replace(diagnosis("matched"), likeness=nothing),), "trial")[0]
+def test_sentences_and_rows_agree_with_the_figures() -> None:
+    section = likeness.section(FOUND, "likeness", "this log")
+    first, unresolved, hidden = section["says"]
+    assert (
+        first
+        == "Before anything is fitted: of 2 effects that this log would show at their usual size, one pair looks much alike."
+    )
+    assert unresolved == "1 pair cannot be told apart at the usual size."
+    assert hidden == "Too small at their usual size to be named here: payload."
+    (row,) = section["rows"]
+    assert (row["names"], row["likeness"], row["from"]) == ("steady wind and current", "above 0.99", "1.4 usual sizes")
+    assert row["record"].startswith("a slow turn")
+    assert "anemometer" in row["measure"]
+    assert likeness.notes(FOUND, "this log") == [
+        "In this log these look alike (1: cannot be told apart): steady wind and current (above 0.99)."
+    ]
 
 
-def test_where_everything_is_separated_it_is_said() -> None:
-    apart = section(replace(LIKE, pairs=()), "likeness", False)
-    assert apart["says"] == "This log separates every two of the 3 effects that it shows at their usual size."
-    assert apart["figures"] == []
-
-
-def test_text_and_json_have_the_pairs(tmp_path: Path) -> None:
-    one = replace(diagnosis("explained"), likeness=LIKE)
-    assert "Alike in this log (1: cannot be separated): steady wind and current (0.970)." in as_text((one,))
-    plain = report((one,), tmp_path).json
-    conforms(plain)
-    assert plain["likeness"]["pairs"][0]["second"] == {"effect": "current", "instance": None}
-    assert plain["likeness"]["effects"][0]["visibility"] == 120.4
-    assert [one["effect"] for one in plain["likeness"]["faint"]] == ["payload"]
+def test_nothing_is_shown_where_nothing_can_be_compared() -> None:
+    alone = Likeness(EFFECTS[:1], np.eye(1), ())
+    assert likeness.section(None, "x", "this log") == likeness.section(alone, "x", "this log") == {}
+    assert likeness.notes(None, "this log") == []
+    assert likeness.section(FOUND, "x", "this log", drawn=False)["figures"] == []

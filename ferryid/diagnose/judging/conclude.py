@@ -32,7 +32,7 @@ from ferryid.diagnose.judging.free_runs import FreeRuns
 from ferryid.diagnose.judging.held_out import HeldOutEvidence, Improvement
 from ferryid.diagnose.judging.hidden_signal import compare_hidden_signals
 from ferryid.diagnose.judging.judge import JudgedLog, sensor_claims
-from ferryid.diagnose.judging.likeness import likeness_of
+from ferryid.diagnose.judging.likeness import likeness_of_logs
 from ferryid.diagnose.judging.locate import locate
 from ferryid.diagnose.judging.posterior import posterior_of
 from ferryid.diagnose.judging.verdict import Remainder, verdict_of
@@ -73,7 +73,8 @@ def conclude(
     noted = (*left_out, *(() if together is None else together.notes))
     same = dict(repeated(logs))
     campaign = tuple(_lasting(claims[one.path]) for one in logs) if baseline.joint else ()
-    return tuple(
+    single, of_all = likeness_of_logs(judged, together, same)
+    found = tuple(
         _with_origin(
             _concluded(by_path[one.path], claims[one.path], campaign, (*_copied(same.get(one.path)), *noted))
             if one.path in by_path
@@ -83,6 +84,10 @@ def conclude(
             same.get(one.path),
         )
         for one in logs
+    )
+    return tuple(
+        replace(one, likeness=single.get(log.path), likeness_of_all=of_all)
+        for one, log in zip(found, logs, strict=True)
     )
 
 
@@ -188,7 +193,6 @@ def _concluded(
         left_out=survey.motion.left_out,
         posterior=posterior_of(problem, kept, selected.search.states, findings, survey) if updates else None,
         remainder=remainder,
-        likeness=likeness_of(problem, log.base, selected.steady),
     )
 
 

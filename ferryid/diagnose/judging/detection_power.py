@@ -13,6 +13,7 @@ from math import erf, sqrt
 import numpy as np
 
 from ferryid.diagnose.inference.estimation import (
+    PARAMETER_DIFFERENCE,
     Candidate,
     EstimationProblem,
     Fit,
@@ -21,11 +22,11 @@ from ferryid.diagnose.inference.estimation import (
 )
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.experiment_design import OTHERWISE, SHOWS
-from ferryid.diagnose.judging.likeness import HULL, imitated_by, response, usual_sizes
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.effects.wording import listed, titled
+from ferryid.types import Floats
 
 AXES = {
     axis: tuple(k for k, name in enumerate(COEFFICIENTS) if name.startswith(begins))
@@ -37,6 +38,8 @@ EXCITES = {
     "sway": "moves sideways to both sides, from rest and back to rest",
     "yaw": "turns on the spot both ways, at several rates",
 }
+HULL = "hull_parameters"
+"""What a log tells of the hull's coefficients is told by axis."""
 
 
 @dataclass(frozen=True)
@@ -64,26 +67,47 @@ def detection_powers(problem: EstimationProblem, kept: Fit, library: Sequence[Ca
     """
     force_model = fitted_force_model(problem.plain, kept)
     before = problem.white(force_model)
-    apart = imitated_by(np.column_stack([problem.by_hull, effect_slopes(problem, kept)]))
+    nuisance = np.column_stack([problem.by_hull, effect_slopes(problem, kept)])
+    inner = nuisance.T @ nuisance + np.eye(nuisance.shape[1])
+
+    def apart(columns: Floats) -> Floats:
+        return np.asarray(columns - nuisance @ np.linalg.solve(inner, nuisance.T @ columns))
+
     taken = {one.key for one in kept.candidates}
     made = []
     for candidate in library:
         if candidate.key in taken or candidate.effect.id == HULL:
             continue
+        size = np.array([one.size for one in candidate.parameters])
         chance = 1.0
-        for usual in usual_sizes(candidate):
-            change, columns = response(problem, force_model, before, candidate, usual)
+        for usual in _usual(candidate):
+            there = problem.white(candidate.act(force_model, usual))
+            change = apart(there - before)
             if not change.any():
+                # Of what comes and goes by chance a force model holds no force: it is found in the noise, and not here.
                 break
-            change, size = apart(change), len(candidate.parameters)
-            information = columns.T @ apart(columns)
+            columns = [
+                (problem.white(candidate.act(force_model, usual + PARAMETER_DIFFERENCE * step)) - there)
+                / PARAMETER_DIFFERENCE
+                for step in np.diag(size)
+            ]
+            information = np.column_stack(columns).T @ apart(np.column_stack(columns))
             strength = float(change @ change)
-            occam = float(np.linalg.slogdet(np.eye(size) + information)[1])
-            evidence = 0.5 * (strength - size - occam)
+            occam = float(np.linalg.slogdet(np.eye(len(size)) + information)[1])
+            evidence = 0.5 * (strength - len(size) - occam)
             chance = min(chance, 0.5 * (1.0 + erf((evidence - INFERENCE.prior_odds) / sqrt(2.0 * max(strength, 1.0)))))
         else:
             made.append(DetectionPower(candidate, chance))
     return tuple(made)
+
+
+def _usual(candidate: Candidate) -> list[Floats]:
+    """Return parameters of usual size: all larger than neutral, and every other one smaller where that is possible."""
+    neutral = np.array([one.neutral for one in candidate.parameters])
+    size = np.array([one.size for one in candidate.parameters])
+    low, high = (np.array([getattr(one, end) for one in candidate.parameters]) for end in ("low", "high"))
+    signs = [np.ones(len(size)), np.where(np.arange(len(size)) % 2 == 0, -1.0, 1.0)]
+    return [np.clip(neutral + sign * size, low, high) for sign in signs]
 
 
 def unexcited_axes(problem: EstimationProblem) -> tuple[str, ...]:

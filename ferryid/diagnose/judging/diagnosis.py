@@ -11,7 +11,7 @@ from ferryid.diagnose.data.course import MeasuredCourse
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.learning import Learned
-from ferryid.diagnose.judging.likeness import Likeness
+from ferryid.diagnose.judging.likeness import Likeness, likeness_as_json
 from ferryid.diagnose.judging.locate import Location, plain_location
 from ferryid.diagnose.judging.posterior import Posterior
 from ferryid.diagnose.judging.verdict import Remainder
@@ -115,7 +115,9 @@ class Diagnosis:
     copy
         True for a log that holds the motion of another one before it.
     likeness
-        How alike the effects look in it; None of a log that is too short.
+        How alike effects look in the log; None where it is too short.
+    likeness_of_all
+        The same in all logs of its campaign together; None of a single log.
     repairs
         What was repaired of the log while it was read, as sentences.
     sources
@@ -143,6 +145,7 @@ class Diagnosis:
     path: str = ""
     copy: bool = False
     likeness: Likeness | None = None
+    likeness_of_all: Likeness | None = None
     repairs: tuple[str, ...] = ()
     sources: SecondSources = field(default_factory=SecondSources)
 
@@ -174,7 +177,7 @@ def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
         **({} if diagnosis.moved is None else {"hull_moved": vars(diagnosis.moved)}),
         **({} if diagnosis.duration_s is None else {"duration_s": diagnosis.duration_s}),
         "left_out": [asdict(one) for one in diagnosis.left_out],
-        **({} if diagnosis.likeness is None else {"likeness": diagnosis.likeness.to_json()}),
+        **({} if diagnosis.likeness is None else {"likeness": likeness_as_json(diagnosis.likeness)}),
         "repairs": list(diagnosis.repairs),
         **({"second_sources": diagnosis.sources.to_json()} if diagnosis.sources else {}),
         **({} if diagnosis.learned is None else {"learned": diagnosis.learned.to_json()}),

@@ -1,8 +1,8 @@
-"""How alike effects look in a log: the angle between what they do to the prediction errors, and how visible each is.
+"""How alike effects look in logs before anything is fitted, how visible each is, and what separates those that look alike.
 
-Two effects that change the prediction errors in the same proportions cannot be separated by any estimator, whatever their
-size; this holds before anything is fitted, and depends on the manoeuvres and the sensors alone. Coefficients of the hull are
-refitted beside every effect, so that what they can imitate within their prior does not count.
+What the hull's coefficients imitate within their prior is projected out of every response. Two effects whose responses then
+span the same space cannot be told apart, whatever is fitted; the cosine of the smallest angle between the two spaces is their
+likeness.
 
 References
 ----------
@@ -11,260 +11,251 @@ Björck and Golub (1973), Numerical methods for computing angles between linear 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
-from itertools import combinations, pairwise
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from math import sqrt
 from typing import Any
 
 import numpy as np
+from scipy.cluster.hierarchy import leaves_list, linkage
+from scipy.spatial.distance import squareform
 
-from ferryid.diagnose.inference.estimation import (
-    PARAMETER_DIFFERENCE,
-    Candidate,
-    EstimationProblem,
-    Fit,
-    fitted_force_model,
-)
+from ferryid.diagnose.judging.campaign import JudgedCampaign
 from ferryid.diagnose.judging.experiment_design import SENSORS, manoeuvre
+from ferryid.diagnose.judging.judge import JudgedLog
+from ferryid.diagnose.judging.responses import HULL, ROUNDING, Key, Responses, responses, together
 from ferryid.diagnose.judging.thresholds import JUDGING
-from ferryid.effects.force_model import ForceModel
-from ferryid.effects.wording import titled
+from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.types import Floats
-
-HULL = "hull_parameters"
-"""What the coefficients of the hull do is taken out of every response, not compared with them."""
-
-Apart = Callable[[Floats], Floats]
-"""What is left of columns after nuisances with a prior have imitated them as far as it lets them."""
 
 
 @dataclass(frozen=True)
-class Seen:
-    """An effect as a log shows it.
+class EffectVisibility:
+    """An effect of usual size in a log.
 
     Attributes
     ----------
     effect, instance, title
-        Which it is.
-    visibility
-        Norm of its response at usual size less what the hull can imitate, in units of the noise: the expected signal-to-noise
-        ratio.
-    hull_share
-        Share of the squared response that the hull's coefficients can imitate, 0 to 1.
+        Which one.
+    signal_to_noise
+        Norm of its response, in standard deviations of the noise; the root mean square over the signs of its parameters.
+    share_of_hull
+        Share of the squared response that the hull's coefficients imitate within their prior, and that is not in it.
     """
 
     effect: str
     instance: str | None
     title: str
-    visibility: float
-    hull_share: float
+    signal_to_noise: float
+    share_of_hull: float
+
+    @property
+    def key(self) -> Key:
+        """Effect and instance."""
+        return self.effect, self.instance
+
+    @property
+    def visible(self) -> bool:
+        """True where it could be named at its usual size."""
+        return self.signal_to_noise >= JUDGING.visible_response
 
 
 @dataclass(frozen=True)
 class Pair:
-    """Two effects of which a log shows nearly the same.
+    """Two effects in a log.
 
     Attributes
     ----------
     first, second
-        Their places in `Likeness.effects`.
+        Effect and instance of each.
     likeness
-        Cosine of the smallest principal angle between their responses: 1 where they cannot be separated.
-    apart
-        What distinguishes the less visible one from the other: its visibility times the sine of that angle, in units
-        of the noise.
-    manoeuvre
-        What to record so that they separate.
-    sensor
-        What to measure so that they separate; None where no sensor of a vessel measures either.
+        Cosine of the smallest angle between their responses: 1 where they cannot be told apart, 0 where nothing is common.
+    resolved_from
+        How many times its usual size the less visible one needs for the log evidence between the two to exceed
+        `JUDGING.unresolved_evidence`; None where no size is enough, as formulas are as far off as the two differ.
+    alike
+        True where both are visible and their likeness is `JUDGING.alike` or more.
     """
 
-    first: int
-    second: int
+    first: Key
+    second: Key
     likeness: float
-    apart: float
-    manoeuvre: str
-    sensor: str | None
+    resolved_from: float | None
+    alike: bool
+
+    @property
+    def resolved(self) -> bool:
+        """True where usual sizes are enough to tell the two apart."""
+        return self.resolved_from is not None and self.resolved_from <= 1.0
 
 
 @dataclass(frozen=True)
 class Likeness:
-    """How alike the effects look in a log.
+    """How alike effects look in a log, or in several together.
 
     Attributes
     ----------
     effects
-        Those that can act and are visible, alike ones side by side, q.
+        Those that do anything there, alike ones beside each other.
     matrix
-        Likeness of every two, shape (q, q).
+        Likeness of every two, in the same order, shape (n, n), ones on the diagonal.
     pairs
-        Those above `JUDGING.alike`, the most alike first.
-    faint
-        Those that act and drown in the noise at their usual size.
+        Every two of them, the most alike first.
     """
 
-    effects: tuple[Seen, ...]
+    effects: tuple[EffectVisibility, ...]
     matrix: Floats
     pairs: tuple[Pair, ...]
-    faint: tuple[Seen, ...] = ()
 
-    def to_json(self) -> dict[str, Any]:
-        """Return it as it stands in ``ferryid.diagnosis/1``."""
-        return {
-            "effects": [asdict(one) for one in self.effects],
-            "faint": [asdict(one) for one in self.faint],
-            "matrix": self.matrix.tolist(),
-            "pairs": [
-                {**asdict(one), **{end: _named(self.effects[getattr(one, end)]) for end in ("first", "second")}}
-                for one in self.pairs
-            ],
-        }
+    @property
+    def alike(self) -> tuple[Pair, ...]:
+        """Pairs of visible effects that look alike, the most alike first."""
+        return tuple(one for one in self.pairs if one.alike)
+
+    @property
+    def hidden(self) -> tuple[EffectVisibility, ...]:
+        """Effects that could not be named at their usual size."""
+        return tuple(one for one in self.effects if not one.visible)
+
+    def title(self, key: Key) -> str:
+        """Return the title of an effect."""
+        return next(one.title for one in self.effects if one.key == key)
 
 
-def likeness_of(problem: EstimationProblem, base: Fit, library: Sequence[Candidate]) -> Likeness:
-    """Return how alike the effects of a library look in a log.
+def likeness(found: Responses) -> Likeness:
+    """Return how alike effects look, and how visible each is, once the hull is projected out with its prior."""
+    h = len(found.hull_spread)
+    across = found.products[:h, h:]
+    left = found.products[h:, h:] - across.T @ np.linalg.solve(found.products[:h, :h] + np.eye(h), across)
+    keys = list(found.titles)
+    own = [[k for k, (key, _) in enumerate(found.parameters) if key == one] for one in keys]
+    whole = [float(np.trace(found.products[h:, h:][np.ix_(places, places)])) for places in own]
+    rest = [max(float(np.trace(left[np.ix_(places, places)])), 0.0) for places in own]
+    there = [k for k in range(len(keys)) if rest[k] > ROUNDING * whole[k]]
+    effects = [
+        EffectVisibility(*keys[k], found.titles[keys[k]], sqrt(rest[k]), 1.0 - rest[k] / whole[k]) for k in there
+    ]
+    bases = [_visible_directions(left[np.ix_(own[k], own[k])]) for k in there]
+    matrix = np.eye(len(there))
+    for i, a in enumerate(there):
+        for j, b in enumerate(there[:i]):
+            matrix[i, j] = matrix[j, i] = cosine(bases[i].T @ left[np.ix_(own[a], own[b])] @ bases[j])
+    order = _order(matrix)
+    effects, matrix = [effects[k] for k in order], matrix[np.ix_(order, order)]
+    pairs = [
+        _pair(found, one, other, float(matrix[i, j]))
+        for i, one in enumerate(effects)
+        for j, other in enumerate(effects)
+        if i < j
+    ]
+    pairs.sort(key=lambda pair: -pair.likeness)
+    return Likeness(tuple(effects), matrix, tuple(pairs))
 
-    Parameters
-    ----------
-    problem, base
-        The log, and its fit without any effect.
-    library
-        The candidates; those that change no prediction error at all are left out.
+
+def cosine(across: Floats) -> float:
+    """Return the cosine of the smallest angle between two spaces, from the products of their orthonormal bases."""
+    return min(float(np.linalg.norm(across, 2)), 1.0)
+
+
+def _visible_directions(products: Floats) -> Floats:
+    """Return an orthonormal basis of an effect's response, in its parameters, shape (q, k).
+
+    Directions that are not visible at usual size would make any two effects alike, and nobody asks for them: they are left out,
+    but for the most visible one.
     """
-    force_model = fitted_force_model(problem.plain, base)
-    before = problem.white(force_model)
-    apart = imitated_by(problem.by_hull)
-    shown: list[tuple[Seen, Floats]] = []
-    faint = []
-    for candidate in library:
-        if candidate.effect.id == HULL:
-            continue
-        usual = usual_sizes(candidate)[0]
-        change, columns = response(problem, force_model, before, candidate, usual)
-        whole, left = float(change @ change), float(change @ apart(change))
-        if whole == 0.0:
-            continue
-        title = titled(candidate.effect.title, candidate.instance)
-        seen = Seen(candidate.effect.id, candidate.instance, title, sqrt(left), 1.0 - left / whole)
-        unreported = candidate.effect.unreported(problem.plain.measurements, usual)
-        reported = [k for k, one in enumerate(candidate.parameters) if one.name not in unreported]
-        if seen.visibility < JUDGING.visible:
-            faint.append(seen)
-        else:
-            shown.append((seen, columns[:, reported]))
-    matrix = likeness_matrix([columns for _, columns in shown], apart)
-    order = side_by_side(matrix)
-    effects, matrix = tuple(shown[k][0] for k in order), matrix[np.ix_(order, order)]
-    return Likeness(effects, matrix, _pairs(effects, matrix), tuple(faint))
+    values, vectors = np.linalg.eigh(products)
+    seen = values >= max(JUDGING.visible_response**2, ROUNDING * values[-1])
+    seen[-1] = True
+    return np.asarray(vectors[:, seen] / np.sqrt(values[seen]))
 
 
-def imitated_by(nuisance: Floats) -> Apart:
-    """Return what takes away what nuisances can imitate.
-
-    With columns N in units of their prior, that leaves ``(1 + N N')⁻¹ x = x - N (1 + N'N)⁻¹ N' x``: the metric in which
-    responses are compared once the nuisances are marginalised.
-    """
-    inner = nuisance.T @ nuisance + np.eye(nuisance.shape[1])
-    return lambda columns: np.asarray(columns - nuisance @ np.linalg.solve(inner, nuisance.T @ columns))
+def _pair(found: Responses, one: EffectVisibility, other: EffectVisibility, alike: float) -> Pair:
+    apart = sqrt(max(1.0 - alike**2, 0.0))
+    size = None
+    if apart > max(found.errors[one.key], found.errors[other.key]):
+        size = sqrt(2.0 * JUDGING.unresolved_evidence) / (apart * min(one.signal_to_noise, other.signal_to_noise))
+    return Pair(one.key, other.key, alike, size, one.visible and other.visible and alike >= JUDGING.alike)
 
 
-def response(
-    problem: EstimationProblem, force_model: ForceModel, before: Floats, candidate: Candidate, usual: Floats
-) -> tuple[Floats, Floats]:
-    """Return what a candidate does to the whitened prediction errors at parameters `usual`.
-
-    Returns
-    -------
-    change
-        Of the errors by the whole effect, shape (w,); zero where it does nothing.
-    columns
-        Derivatives by its parameters in their sizes, shape (w, q); empty where it does nothing.
-    """
-    there = problem.white(candidate.act(force_model, usual))
-    change = there - before
-    if not change.any():
-        # Of what comes and goes by chance a force model holds no force: it is found in the noise, and not here.
-        return change, np.empty((len(change), 0))
-    steps = np.diag([one.size for one in candidate.parameters])
-    moved = (problem.white(candidate.act(force_model, usual + PARAMETER_DIFFERENCE * step)) for step in steps)
-    return change, np.column_stack([(one - there) / PARAMETER_DIFFERENCE for one in moved])
-
-
-def usual_sizes(candidate: Candidate) -> list[Floats]:
-    """Return parameters of usual size: all larger than neutral, and every other one smaller where that is possible."""
-    neutral = np.array([one.neutral for one in candidate.parameters])
-    size = np.array([one.size for one in candidate.parameters])
-    low, high = (np.array([getattr(one, end) for one in candidate.parameters]) for end in ("low", "high"))
-    signs = [np.ones(len(size)), np.where(np.arange(len(size)) % 2 == 0, -1.0, 1.0)]
-    return [np.clip(neutral + sign * size, low, high) for sign in signs]
-
-
-def likeness_matrix(responses: Sequence[Floats], apart: Apart) -> Floats:
-    """Return the cosine of the smallest principal angle between every two responses, shape (q, q).
-
-    Parameters
-    ----------
-    responses
-        Columns of each effect, shape (w, p) with a p of its own; directions of less than `JUDGING.faint_direction` of its
-        strongest are not what it looks like, and left out.
-    apart
-        From `imitated_by`: it defines the inner product ``a' apart(b)``.
-    """
-    if not responses:
-        return np.empty((0, 0))
-    every = np.hstack(responses)
-    gram = every.T @ apart(every)
-    ends = np.cumsum([0, *(one.shape[1] for one in responses)])
-    parts = [slice(first, end) for first, end in pairwise(ends.tolist())]
-    frames = [_frame(gram[part, part]) for part in parts]
-    matrix = np.eye(len(responses))
-    for i, j in combinations(range(len(responses)), 2):
-        cosines = np.linalg.svd(frames[i].T @ gram[parts[i], parts[j]] @ frames[j], compute_uv=False)
-        matrix[i, j] = matrix[j, i] = min(float(cosines[0]), 1.0)
-    return matrix
-
-
-def _frame(gram: Floats) -> Floats:
-    """Return combinations of columns with this Gram matrix that are orthonormal, of the directions that count."""
-    values, vectors = np.linalg.eigh(gram)
-    kept = values >= JUDGING.faint_direction**2 * values[-1]
-    return np.asarray(vectors[:, kept] / np.sqrt(values[kept]))
-
-
-def side_by_side(matrix: Floats) -> list[int]:
-    """Return an order in which what is alike lies side by side: from the most alike two, at either end the next."""
+def _order(matrix: Floats) -> list[int]:
+    """Return the places of effects so that alike ones stand beside each other: average linkage, leaves in optimal order."""
     if len(matrix) < 3:
         return list(range(len(matrix)))
-    off = matrix - 2.0 * np.eye(len(matrix))
-    order = [int(k) for k in np.unravel_index(int(np.argmax(off)), off.shape)]
-    left = set(range(len(matrix))) - set(order)
-    while left:
-        end, new = max(((end, k) for end in (0, -1) for k in sorted(left)), key=lambda one: off[order[one[0]], one[1]])
-        order.insert(0 if end == 0 else len(order), new)
-        left.remove(new)
-    return order
+    distance = np.sqrt(np.clip(1.0 - matrix**2, 0.0, 1.0))
+    np.fill_diagonal(distance, 0.0)
+    return [int(k) for k in leaves_list(linkage(squareform(distance, checks=False), "average", optimal_ordering=True))]
 
 
-def _pairs(effects: Sequence[Seen], matrix: Floats) -> tuple[Pair, ...]:
-    found = []
-    for i, j in combinations(range(len(effects)), 2):
-        if matrix[i, j] >= JUDGING.alike:
-            one, other = effects[i], effects[j]
-            sine = sqrt(max(1.0 - matrix[i, j] ** 2, 0.0))
-            sensors = dict.fromkeys(SENSORS[name] for name in (one.effect, other.effect) if name in SENSORS)
-            found.append(
-                Pair(
-                    i,
-                    j,
-                    float(matrix[i, j]),
-                    min(one.visibility, other.visibility) * sine,
-                    manoeuvre(one.effect, [other.effect]) or "",
-                    " or ".join(sensors) or None,
-                )
-            )
-    return tuple(sorted(found, key=lambda one: -one.likeness))
+@dataclass(frozen=True)
+class Separation:
+    """What separates two effects: a manoeuvre to record, and a sensor, empty where none measures either."""
+
+    manoeuvre: str
+    sensor: str
 
 
-def _named(one: Seen) -> dict[str, str | None]:
-    return {"effect": one.effect, "instance": one.instance}
+def separation(first: Key, second: Key) -> Separation:
+    """Return what separates two effects."""
+    sensors = dict.fromkeys(SENSORS[effect] for effect, _ in (first, second) if effect in SENSORS)
+    return Separation(manoeuvre(first[0], [second[0]]) or "", " or ".join(sensors))
+
+
+def likeness_of_logs(
+    judged: Sequence[JudgedLog], campaign: JudgedCampaign | None, repeated: Collection[str] = ()
+) -> tuple[dict[str, Likeness], Likeness | None]:
+    """Return how alike effects look in each of several logs, by path, and in all of them together.
+
+    Parameters
+    ----------
+    judged
+        Logs that are long enough.
+    campaign
+        What they say together: its hull's prior is that of all; None of logs that are no campaign, which have no such sum.
+    repeated
+        Paths of logs that hold the motion of another; they count once.
+    """
+    every = {one.selected.path: _responses(one) for one in judged}
+    single = {path: likeness(one) for path, one in every.items()}
+    own = [one for path, one in every.items() if path not in repeated]
+    if campaign is None or not own:
+        return single, None
+    spread = campaign.hull.fit.campaign.hull.spread[: len(COEFFICIENTS)]
+    return single, likeness(together(own, spread))
+
+
+def _responses(log: JudgedLog) -> Responses:
+    """Return the responses as they are before anything is fitted but hull and noise."""
+    estimated = log.selected.estimated
+    if estimated.baseline.updates_model:
+        return responses(estimated.problem)
+    # The neutral values are those of the simulation that the recording is compared with.
+    return responses(estimated.problem, [one for one in log.selected.steady if one.effect.id != HULL])
+
+
+def likeness_as_json(found: Likeness) -> dict[str, Any]:
+    """Return effects with their visibility, and every two with their likeness, as in ``ferryid.diagnosis/1``."""
+    return {
+        "effects": [
+            {
+                "effect": one.effect,
+                "instance": one.instance,
+                "signal_to_noise": one.signal_to_noise,
+                "visible": one.visible,
+                "share_of_hull": one.share_of_hull,
+            }
+            for one in found.effects
+        ],
+        "pairs": [_pair_as_json(one) for one in found.pairs],
+    }
+
+
+def _pair_as_json(pair: Pair) -> dict[str, Any]:
+    between = separation(pair.first, pair.second) if pair.alike else None
+    return {
+        "effects": [{"effect": effect, "instance": instance} for effect, instance in (pair.first, pair.second)],
+        "likeness": pair.likeness,
+        "resolved_from": pair.resolved_from,
+        "alike": pair.alike,
+        "separating_manoeuvre": None if between is None else between.manoeuvre or None,
+        "separating_sensor": None if between is None else between.sensor or None,
+    }

@@ -117,23 +117,17 @@ class JudgingThresholds:
         "cosine between what an effect and a term do to a log above which they are the same explanation",
         "tuned on cases of `ferryid prove`: a law on one thruster's force displaced that thruster's lower gain",
     )
+    visible_response: float = threshold(
+        4.0,
+        "standard deviations",
+        "least response of an effect of usual size that counts as visible",
+        "derived: half its square is the log evidence, which then reaches `prior_odds`",
+    )
     alike: float = threshold(
-        0.9,
+        0.79,
         "-",
-        "likeness of two effects in a log from which they are named as a pair that it hardly separates",
-        "convention: less than half of a response, 0.44, distinguishes it from the other",
-    )
-    visible: float = threshold(
-        1.0,
-        "standard deviations of the noise",
-        "norm of an effect's response at usual size below which it is not compared with others",
-        "derived: noise alone is as large",
-    )
-    faint_direction: float = threshold(
-        0.1,
-        "of the strongest direction",
-        "response to a combination of an effect's parameters below which that is not what the effect looks like",
-        "convention: a tenth; a weak combination would need ten times the usual size to look like another effect",
+        "likeness from which two visible effects are named as alike",
+        "derived: sqrt(1 - 3/8); of an effect that is just visible, 8 nat, `unresolved_evidence` is left beside the other",
     )
     law_expected_gain: float = threshold(
         4.0,

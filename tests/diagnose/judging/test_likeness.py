@@ -1,161 +1,166 @@
-"""How alike effects look: angles worked by hand, what a hull takes away, and rivals that a manoeuvre separates."""
+"""How alike effects look: angles worked out by hand, what they depend on, and rivals on logs of one heading and of many."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from math import cos, radians, sqrt
 from pathlib import Path
-from types import SimpleNamespace
-from typing import cast
 
 import numpy as np
 import pytest
 
-from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, fit
-from ferryid.diagnose.inference.search import list_candidates
-from ferryid.diagnose.judging.likeness import (
-    Likeness,
-    imitated_by,
-    likeness_matrix,
-    likeness_of,
-    side_by_side,
-)
+from ferryid.diagnose.judging.likeness import Likeness, likeness, likeness_as_json, separation
+from ferryid.diagnose.judging.responses import Key, Responses, responses, together
 from ferryid.diagnose.judging.thresholds import JUDGING
-from ferryid.effects.effect import Effect, Parameter
-from ferryid.effects.force_model import COEFFICIENTS, ForceModel, Measurements, hull_of
 from ferryid.types import Floats
-from tests.diagnose.trials import FERRY, sailed, trial_on
+from tests.diagnose.trials import sailed, trial_on
 
-NONE = imitated_by(np.zeros((4, 1)))
-A, B, C = np.eye(4)[:, [0]], np.eye(4)[:, [1]], np.eye(4)[:, [2]]
-
-
-def alike(one: Floats, other: Floats) -> float:
-    return float(likeness_matrix([one, other], NONE)[0, 1])
-
-
-def test_what_is_proportional_cannot_be_separated() -> None:
-    assert alike(3.0 * A, -0.5 * A) == pytest.approx(1.0)
-    # A line within a plane, too.
-    assert alike(A + B, np.hstack([A, B])) == pytest.approx(1.0)
+ROWS, H = 40, 26
+RANDOM = np.random.default_rng(8)
+NO_HULL: Floats = np.zeros((ROWS, H))
+WIND, CURRENT, GAIN = ("wind", None), ("current", None), ("thruster_gain", "bow")
+UNIT = np.linalg.qr(RANDOM.normal(size=(ROWS, 6)))[0]
+"""Six orthonormal columns."""
 
 
-def test_what_is_orthogonal_cannot_be_mistaken() -> None:
-    assert alike(A, B) == pytest.approx(0.0)
-    assert alike(np.hstack([A, B]), C) == pytest.approx(0.0)
+def made(columns: dict[Key, Floats], hull: Floats = NO_HULL, error: float = 0.05) -> Responses:
+    parameters = tuple((key, f"p{k}") for key, block in columns.items() for k in range(block.shape[1]))
+    every = np.column_stack([hull, *columns.values()])
+    spread = np.where(hull.any(axis=0), 1.0, 0.0)
+    titles = {key: key[0].capitalize() for key in columns}
+    return Responses(titles, dict.fromkeys(columns, error), parameters, spread, every.T @ every)
 
 
-def test_likeness_is_the_cosine_of_the_smallest_angle() -> None:
-    # 60 degrees apart, as lines; and as planes that share no line.
-    lean = 0.5 * A + np.sqrt(0.75) * C
-    assert alike(A, lean) == pytest.approx(0.5)
-    assert alike(np.hstack([A, B]), lean) == pytest.approx(0.5)
+def alike(found: Likeness, first: Key, second: Key) -> float:
+    return next(one.likeness for one in found.pairs if {one.first, one.second} == {first, second})
 
 
-def test_the_scale_of_an_effect_does_not_matter() -> None:
-    rng = np.random.default_rng(3)
-    one, other = rng.standard_normal((4, 2)), rng.standard_normal((4, 1))
-    assert alike(1e4 * one, 1e-3 * other) == pytest.approx(alike(one, other), rel=1e-9)
+def two(first: Floats, second: Floats, hull: Floats = NO_HULL) -> float:
+    return alike(likeness(made({WIND: first, CURRENT: second}, hull)), WIND, CURRENT)
 
 
-def test_a_faint_combination_is_not_what_an_effect_looks_like() -> None:
-    share = JUDGING.faint_direction
-    assert alike(np.hstack([A, 0.5 * share * B]), B) == pytest.approx(0.0)
-    assert alike(np.hstack([A, 2.0 * share * B]), B) == pytest.approx(1.0)
+def test_proportional_responses_are_wholly_alike_and_orthogonal_ones_not_at_all() -> None:
+    assert two(30.0 * UNIT[:, :1], -70.0 * UNIT[:, :1]) == pytest.approx(1.0)
+    assert two(30.0 * UNIT[:, :1], 70.0 * UNIT[:, 1:2]) == pytest.approx(0.0, abs=1e-9)
 
 
-def test_what_a_nuisance_can_imitate_does_not_make_effects_alike() -> None:
-    # Both have much of the same nuisance in them, and little of their own.
-    one, other = 10.0 * A + B, 10.0 * A + C
-    assert alike(one, other) > 0.98
-    taken = likeness_matrix([one, other], imitated_by(1e4 * A))
-    assert taken[0, 1] == pytest.approx(0.0, abs=1e-5)
+def test_likeness_is_the_cosine_of_the_smallest_angle_between_two_planes() -> None:
+    # Two planes at 25 and 70 degrees in two orthogonal planes of their own.
+    turned = [np.cos(radians(a)) * UNIT[:, k] + np.sin(radians(a)) * UNIT[:, k + 2] for k, a in enumerate((25.0, 70.0))]
+    assert two(50.0 * UNIT[:, :2], 50.0 * np.column_stack(turned)) == pytest.approx(cos(radians(25.0)))
 
 
-def test_alike_ones_lie_side_by_side() -> None:
-    matrix = np.eye(4)
-    for i, j, value in ((0, 2, 0.9), (0, 1, 0.8), (2, 3, 0.3)):
-        matrix[i, j] = matrix[j, i] = value
-    assert side_by_side(matrix) == [1, 0, 2, 3]
+def test_neither_scale_nor_the_choice_of_parameters_matters() -> None:
+    first, second = 100.0 * RANDOM.normal(size=(ROWS, 2)), 100.0 * RANDOM.normal(size=(ROWS, 3))
+    before = two(first, second)
+    assert 0.1 < before < 0.9
+    mixed = first @ np.array([[2.0, -1.0], [0.5, 3.0]])
+    assert two(mixed, 7.0 * second[:, ::-1]) == pytest.approx(before)
 
 
-def pushing(name: str, axis: int, size: float = 10.0) -> Candidate:
-    def act(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
-        push = np.zeros(3)
-        push[axis] = p[0]
-        return replace(force_model, external=force_model.external + push)
+def test_what_the_hull_imitates_within_its_prior_is_taken_out() -> None:
+    # The two have nothing but their share of a hull's slope in common.
+    slope = 20.0 * UNIT[:, 2:3]
+    first, second = 40.0 * UNIT[:, :1] + slope, 40.0 * UNIT[:, 1:2] + slope
+    assert two(first, second) == pytest.approx(0.2)
+    hull = NO_HULL.copy()
+    hull[:, 4] = 3.0 * UNIT[:, 2]
+    # A slope of three standard deviations of the noise takes 1 - 1/(1 + 3²) of the squared share.
+    left = 400.0 / 10.0
+    found = likeness(made({WIND: first, CURRENT: second}, hull))
+    assert alike(found, WIND, CURRENT) == pytest.approx(left / (1600.0 + left))
+    for one in found.effects:
+        assert one.signal_to_noise == pytest.approx(sqrt(1600.0 + left))
+        assert one.share_of_hull == pytest.approx(360.0 / 2000.0)
 
-    effect = Effect(name, name.capitalize(), lambda profile: (), act, lambda v, i: "", lambda v, i: {})
-    return Candidate(effect, None, (Parameter("force", "N", size, -1e4, 1e4),))
+
+def test_a_direction_that_noise_hides_makes_nothing_alike() -> None:
+    hidden = 0.9 * JUDGING.visible_response * UNIT[:, 1]
+    first = np.column_stack([50.0 * UNIT[:, 0], hidden])
+    assert two(first, 50.0 * UNIT[:, 1:2]) == pytest.approx(0.0, abs=1e-9)
+    first[:, 1] *= 1.2
+    assert two(first, 50.0 * UNIT[:, 1:2]) == pytest.approx(1.0)
 
 
-def pushed(library: list[Candidate], hull: float = 0.0) -> Likeness:
-    """Return what is seen where the prediction errors are the pushes themselves, and the hull can push ahead."""
-    zero = np.zeros((50, 3))
-    measurements = Measurements(
-        FERRY, np.arange(50) * 0.2, zero, zero, zero, np.zeros((50, 2, 3)), zero, np.ones(50, dtype=bool)
+def test_from_which_size_on_two_are_resolved() -> None:
+    angle = radians(30.0)
+    first, second = 10.0 * UNIT[:, :1], 40.0 * (np.cos(angle) * UNIT[:, :1] + np.sin(angle) * UNIT[:, 1:2])
+    (pair,) = likeness(made({WIND: first, CURRENT: second})).pairs
+    # Of s times ten standard deviations, the sine of the angle is left: half its square is the log evidence.
+    assert pair.resolved_from == pytest.approx(sqrt(2.0 * JUDGING.unresolved_evidence) / 5.0)
+    assert pair.alike
+    assert pair.resolved
+    (pair,) = likeness(made({WIND: first, CURRENT: second}, error=0.51)).pairs
+    assert pair.resolved_from is None
+    assert not pair.resolved
+    (pair,) = likeness(made({WIND: 0.3 * first, CURRENT: second})).pairs
+    assert not pair.alike, "an effect that is too small to be named looks like everything"
+
+
+def test_the_limit_is_where_an_effect_that_is_just_visible_is_just_resolved() -> None:
+    apart = sqrt(1.0 - JUDGING.alike**2)
+    first = JUDGING.visible_response * UNIT[:, :1]
+    second = 100.0 * (JUDGING.alike * UNIT[:, :1] + apart * UNIT[:, 1:2])
+    (pair,) = likeness(made({WIND: first, CURRENT: second})).pairs
+    assert pair.resolved_from == pytest.approx(1.0, abs=0.01)
+
+
+def test_logs_together_separate_what_each_alone_does_not() -> None:
+    first = made({WIND: 20.0 * UNIT[:, :1], CURRENT: 20.0 * UNIT[:, :1], GAIN: 20.0 * UNIT[:, 2:3]})
+    second = made({WIND: 20.0 * UNIT[:, :1], CURRENT: -20.0 * UNIT[:, :1]})
+    found = likeness(together([first, second]))
+    assert alike(likeness(first), WIND, CURRENT) == alike(likeness(second), WIND, CURRENT) == pytest.approx(1.0)
+    assert alike(found, WIND, CURRENT) == pytest.approx(0.0, abs=1e-9)
+    assert {one.key: round(one.signal_to_noise, 6) for one in found.effects}[WIND] == round(20.0 * sqrt(2.0), 6)
+    assert {one.key for one in found.effects} == {WIND, CURRENT, GAIN}
+
+
+def test_logs_together_have_one_prior_of_the_hull() -> None:
+    hull = NO_HULL.copy()
+    hull[:, 4] = 3.0 * UNIT[:, 2]
+    one = made({WIND: 40.0 * UNIT[:, :1] + 20.0 * UNIT[:, 2:3]}, hull)
+    # Half the prior's width makes half the slope in its units.
+    narrow = replace(
+        one, hull_spread=0.5 * one.hull_spread, products=one.with_hull_spread(0.5 * one.hull_spread).products
     )
-    plain = ForceModel(measurements, hull_of(FERRY), measurements.parts, measurements.angles, zero)
-    by_hull = np.zeros((150, len(COEFFICIENTS)))
-    by_hull[::3, 0] = hull
-    problem = SimpleNamespace(plain=plain, by_hull=by_hull, white=lambda force_model: force_model.external.ravel())
-    base = Fit((), (), np.empty((0, 0)), hull_of(FERRY), 0.0)
-    return likeness_of(cast(EstimationProblem, problem), base, library)
+    both = likeness(together([one, narrow])).effects[0]
+    assert both.signal_to_noise**2 == pytest.approx(2.0 * 1600.0 + 2.0 * 400.0 / (1.0 + 2.0 * 9.0))
 
 
-def test_visibility_is_the_signal_to_noise_ratio_at_usual_size() -> None:
-    # Fifty rows of 10 N where the noise is one: the norm is 10 sqrt(50).
-    (one,) = pushed([pushing("ahead", 0)]).effects
-    assert one.visibility == pytest.approx(10.0 * np.sqrt(50.0))
-    assert one.hull_share == pytest.approx(0.0)
-    # A coefficient that gives 1 N at its usual size leaves 1 / (1 + 50) of the squared response.
-    (one,) = pushed([pushing("ahead", 0)], hull=1.0).effects
-    assert one.visibility == pytest.approx(10.0 * np.sqrt(50.0 / 51.0))
-    assert one.hull_share == pytest.approx(50.0 / 51.0)
+def test_json_names_what_separates_a_pair_that_looks_alike() -> None:
+    plain = likeness_as_json(
+        likeness(made({WIND: 30.0 * UNIT[:, :1], CURRENT: 30.0 * UNIT[:, :1], GAIN: 30.0 * UNIT[:, 1:2]}))
+    )
+    pair = plain["pairs"][0]
+    assert pair["alike"]
+    assert pair["resolved_from"] is None
+    assert {one["effect"] for one in pair["effects"]} == {"wind", "current"}
+    assert pair["separating_manoeuvre"].startswith("a slow turn on the spot")
+    assert "anemometer" in pair["separating_sensor"]
+    assert [one["alike"] for one in plain["pairs"][1:]] == [False, False]
+    assert all(one["separating_manoeuvre"] is None for one in plain["pairs"][1:])
+    assert separation(GAIN, GAIN).manoeuvre
 
 
-def test_what_does_nothing_is_no_effect_and_what_noise_hides_is_not_compared() -> None:
-    still = replace(pushing("still", 0).effect, apply=lambda force_model, p, instance: force_model)
-    seen = pushed([pushing("ahead", 0), pushing("aside", 1, size=0.1), replace(pushing("still", 0), effect=still)])
-    assert [one.effect for one in seen.effects] == ["ahead"]
-    assert [one.effect for one in seen.faint] == ["aside"]
-    assert seen.pairs == ()
-
-
-def test_a_pair_is_named_with_what_separates_it() -> None:
-    seen = pushed([pushing("wind", 0), pushing("payload", 1), pushing("current", 0)])
-    (pair,) = seen.pairs
-    assert {seen.effects[pair.first].effect, seen.effects[pair.second].effect} == {"wind", "current"}
-    assert pair.likeness == pytest.approx(1.0)
-    assert pair.apart == pytest.approx(0.0, abs=1e-3)
-    assert "turn on the spot" in pair.manoeuvre
-    assert pair.sensor is not None
-    assert "anemometer" in pair.sensor
-    plain = seen.to_json()
-    assert {plain["pairs"][0][end]["effect"] for end in ("first", "second")} == {"wind", "current"}
-    assert plain["matrix"][0][0] == 1.0
-
-
-SCENARIO = """
-schema = "ferryid.scenario/1"
-vessel = "milliampere"
-[path]
-{path}
-dwell_s = 30
-"""
-PATHS = {
-    "one heading": 'kind = "points"\npoints = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 0, 0], [1, 0, 0]]',
-    "twelve corners": 'kind = "twelve-corner"',
-}
+SCENARIO = 'schema = "ferryid.scenario/1"\nvessel = "milliampere"\n[path]\nkind = "points"\npoints = {}\ndwell_s = 40\n'
+ONE_HEADING = "[[4, 0, 0], [4, 4, 0], [0, 4, 0], [0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0], [0, 0, 0]]"
+TWELVE_CORNER = SCENARIO.replace('"points"\npoints = {}', '"twelve-corner"')
 
 
 @pytest.mark.slow
-def test_a_turn_separates_what_one_heading_does_not(tmp_path: Path) -> None:
-    found: dict[str, float] = {}
-    for name, path in PATHS.items():
-        problem = trial_on(sailed(tmp_path, name, SCENARIO.format(path=path), 1))
-        library, _ = list_candidates(problem.plain.measurements)
-        seen = likeness_of(problem, fit(problem, ()), [one for one in library if one.effect.unsteady is None])
-        names = [one.effect for one in seen.effects]
-        found[name] = float(seen.matrix[names.index("wind"), names.index("current")])
-    assert found["one heading"] > 0.98
-    assert found["twelve corners"] < JUDGING.alike
+def test_rivals_look_alike_on_one_heading_and_apart_on_many(tmp_path: Path) -> None:
+    found = {
+        name: likeness(responses(trial_on(sailed(tmp_path, name, scenario, 3))))
+        for name, scenario in (("one", SCENARIO.format(ONE_HEADING)), ("many", TWELVE_CORNER))
+    }
+    mooring, payload, gain = ("mooring", None), ("payload", None), ("thruster_gain", "thruster1")
+    for first, second, most in ((WIND, CURRENT, 0.95), (WIND, mooring, 0.97), (gain, payload, 0.9)):
+        one, many = (alike(found[name], first, second) for name in ("one", "many"))
+        assert many < most, (first, second)
+        # Of the less visible one of them, half as much again is left to tell it from the other.
+        assert sqrt(1.0 - many**2) > 1.5 * sqrt(1.0 - one**2), (first, second)
+    # What acts on different axes never looks alike.
+    assert alike(found["many"], WIND, gain) < 0.2
+    every = {one.effect for one in found["many"].effects}
+    assert {"gusts", "waves", "hull_parameters"}.isdisjoint(every)
+    assert len(every) == 14
