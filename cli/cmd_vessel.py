@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from ferryid.cli.options import Json
-from ferryid.cli.output import emit
+from ferryid.cli.output import emit, progress
 
 app = typer.Typer(
     help="Check, show and list vessel profiles.", no_args_is_help=True, rich_markup_mode=None, add_completion=False
@@ -16,11 +16,20 @@ File = Annotated[str, typer.Argument(help="Path of a profile (TOML), or the name
 
 
 @app.command()
-def check(file: File, json: Json = None) -> None:
+def check(
+    file: File,
+    identifiable: Annotated[
+        bool,
+        typer.Option(
+            "--identifiable", help="Simulate the vessel: which effects its sensors can tell apart, what would help."
+        ),
+    ] = False,
+    json: Json = None,
+) -> None:
     """Explain every fault of a profile with its line; warnings alone do not fail it."""
     from ferryid import api
 
-    outcome = api.check_vessel(file)
+    outcome = api.check_vessel(file, identifiable=identifiable, progress=progress)
     emit(outcome, json)
     if any(not fault["warning"] for fault in outcome.json["faults"]):
         raise typer.Exit(2)

@@ -504,14 +504,24 @@ def vessels() -> Outcome:
     return _outcome({"schema": "ferryid.vessels/1", "vessels": listed}, text)
 
 
-def check_vessel(file: str | Path) -> Outcome:
-    """Return every fault of a vessel profile with its line; ``json["faults"]`` is empty where there is none."""
+def check_vessel(file: str | Path, *, identifiable: bool = False, progress: Progress = _quiet) -> Outcome:
+    """Return every fault of a vessel profile with its line; ``json["faults"]`` is empty where there is none.
+
+    With `identifiable`, a profile without faults is simulated, and ``json["identifiability"]`` has which effects its sensors
+    can tell apart, and what each further sensor adds.
+    """
     from ferryid.vessel import check_profile
 
     faults = check_profile(str(file))
     lines = [f"{file}:{fault.line}: {'warning: ' if fault.warning else ''}{fault.message}" for fault in faults]
     result = {"schema": "ferryid.vessel-check/1", "file": str(file), "faults": [asdict(fault) for fault in faults]}
-    return _outcome(result, "\n".join(lines) if lines else f"{file}: no faults")
+    text = "\n".join(lines) if lines else f"{file}: no faults"
+    if not identifiable or any(not fault.warning for fault in faults):
+        return _outcome(result, text)
+    from ferryid.identifiability import as_json, as_text, study
+
+    found = study(_profile(file), progress)
+    return _outcome({**result, "identifiability": as_json(found)}, f"{text}\n\n{as_text(found)}")
 
 
 def reproduce(

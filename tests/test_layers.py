@@ -34,6 +34,7 @@ ORDER = (
     "compare",
     "diagnose",
     "simulate",
+    "identifiability",
     "report",
     "export",
     "reproduce",

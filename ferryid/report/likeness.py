@@ -68,7 +68,7 @@ def section(likeness: Likeness | None, file: str, where: str, *, drawn: bool = T
         return {}
     caption = (
         f"Likeness of what every two effects do to the prediction errors of {where}, after what a refitted hull takes of it: 1 "
-        "where they cannot be told apart, 0 where neither looks like the other at all. Alike ones stand beside each other. "
+        "where they cannot be distinguished, 0 where neither looks like the other at all. Alike ones stand beside each other. "
         "σ: signal-to-noise ratio of the effect at its usual size; grey where that is too little to be named."
     )
     return {
@@ -95,7 +95,7 @@ def sentences(likeness: Likeness, where: str) -> list[str]:
         )
         apart = [one for one in likeness.alike if not one.resolved]
         if apart:
-            lines.append(f"{counted(len(apart), 'pair').capitalize()} cannot be told apart at the usual size.")
+            lines.append(f"{counted(len(apart), 'pair').capitalize()} cannot be distinguished at the usual size.")
     if likeness.hidden:
         names = listed([_inline(one.title) for one in likeness.hidden])
         lines.append(f"Too small at their usual size to be named here: {names}.")
@@ -109,7 +109,7 @@ def notes(likeness: Likeness | None, where: str) -> list[str]:
     pairs = [f"{names(likeness, one)} ({_value(one)})" for one in likeness.alike[:IN_TEXT]]
     more = len(likeness.alike) - IN_TEXT
     pairs += [counted(more, "other pair")] if more > 0 else []
-    return [f"In {where} these look alike (1: cannot be told apart): {'; '.join(pairs)}."]
+    return [f"In {where} these look alike (1: cannot be distinguished): {'; '.join(pairs)}."]
 
 
 def names(likeness: Likeness, pair: Pair) -> str:
@@ -118,7 +118,7 @@ def names(likeness: Likeness, pair: Pair) -> str:
 
 
 def resolved(pair: Pair) -> str:
-    """Return from which size on two effects are told apart."""
+    """Return from which size on two effects are distinguished."""
     if pair.resolved_from is None:
         return "at no size"
     return (

@@ -40,14 +40,14 @@ def test_sentences_and_rows_agree_with_the_figures() -> None:
         first
         == "Before anything is fitted: of 2 effects that this log would show at their usual size, one pair looks much alike."
     )
-    assert unresolved == "1 pair cannot be told apart at the usual size."
+    assert unresolved == "1 pair cannot be distinguished at the usual size."
     assert hidden == "Too small at their usual size to be named here: payload."
     (row,) = section["rows"]
     assert (row["names"], row["likeness"], row["from"]) == ("steady wind and current", "above 0.99", "1.4 usual sizes")
     assert row["record"].startswith("a slow turn")
     assert "anemometer" in row["measure"]
     assert likeness.notes(FOUND, "this log") == [
-        "In this log these look alike (1: cannot be told apart): steady wind and current (above 0.99)."
+        "In this log these look alike (1: cannot be distinguished): steady wind and current (above 0.99)."
     ]
 
 

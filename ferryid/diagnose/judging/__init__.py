@@ -3,6 +3,8 @@
 from ferryid.diagnose.judging.confidence_rules import RULES, ConfidenceRule
 from ferryid.diagnose.judging.diagnosis import SCHEMA, Diagnosis, to_json
 from ferryid.diagnose.judging.finding import UNKNOWN, Finding
+from ferryid.diagnose.judging.likeness import EffectVisibility, Likeness, Pair, likeness, likeness_as_json, separation
+from ferryid.diagnose.judging.responses import Key, responses
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.judging.verdict import VERDICTS, Remainder, campaign_verdict, verdict_of
 
@@ -14,9 +16,17 @@ __all__ = [
     "VERDICTS",
     "ConfidenceRule",
     "Diagnosis",
+    "EffectVisibility",
     "Finding",
+    "Key",
+    "Likeness",
+    "Pair",
     "Remainder",
     "campaign_verdict",
+    "likeness",
+    "likeness_as_json",
+    "responses",
+    "separation",
     "to_json",
     "verdict_of",
 ]

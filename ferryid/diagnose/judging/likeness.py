@@ -227,9 +227,9 @@ def _responses(log: JudgedLog) -> Responses:
     """Return the responses as they are before anything is fitted but hull and noise."""
     estimated = log.selected.estimated
     if estimated.baseline.updates_model:
-        return responses(estimated.problem)
+        return responses(estimated.problem, log.base)
     # The neutral values are those of the simulation that the recording is compared with.
-    return responses(estimated.problem, [one for one in log.selected.steady if one.effect.id != HULL])
+    return responses(estimated.problem, log.base, [one for one in log.selected.steady if one.effect.id != HULL])
 
 
 def likeness_as_json(found: Likeness) -> dict[str, Any]:

@@ -13,9 +13,10 @@ from math import sqrt
 
 import numpy as np
 
-from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem
+from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, fitted_force_model
 from ferryid.diagnose.inference.search import list_candidates
 from ferryid.effects.effect import HELD
+from ferryid.effects.force_model import ForceModel
 from ferryid.effects.wording import titled
 from ferryid.types import Floats
 
@@ -69,20 +70,21 @@ def candidates_of(problem: EstimationProblem) -> list[Candidate]:
     ]
 
 
-def responses(problem: EstimationProblem, candidates: Sequence[Candidate] | None = None) -> Responses:
-    """Return what hull and effects do to the prediction errors of a log, beside what its plain force model has.
+def responses(problem: EstimationProblem, base: Fit, candidates: Sequence[Candidate] | None = None) -> Responses:
+    """Return what hull and effects do to the prediction errors of a log, beside a hull that was fitted without effects.
 
     Parameters
     ----------
-    problem
-        The log.
+    problem, base
+        The log, and its fit without any effect: in a hull that nobody modelled, a current would do nothing.
     candidates
         The effects; those of `candidates_of` where None.
     """
-    columns, parameters = [problem.by_hull], list[tuple[Key, str]]()
+    force_model = fitted_force_model(problem.plain, base)
+    columns, parameters = [problem.hull_slopes(force_model)], list[tuple[Key, str]]()
     titles, errors = dict[Key, str](), dict[Key, float]()
     for candidate in candidates_of(problem) if candidates is None else candidates:
-        names, response = _response(problem, candidate)
+        names, response = _response(problem, force_model, candidate)
         if not names:
             continue
         columns.append(response)
@@ -93,7 +95,7 @@ def responses(problem: EstimationProblem, candidates: Sequence[Candidate] | None
     return Responses(titles, errors, tuple(parameters), problem.hull_spread, every.T @ every)
 
 
-def _response(problem: EstimationProblem, candidate: Candidate) -> tuple[list[str], Floats]:
+def _response(problem: EstimationProblem, force_model: ForceModel, candidate: Candidate) -> tuple[list[str], Floats]:
     """Return the parameters that do anything, and the change that each makes at its usual size, shape (w, q).
 
     Each goes from its neutral value to both sides as far as it may; one that means nothing there, such as the place of a
@@ -118,7 +120,7 @@ def _response(problem: EstimationProblem, candidate: Candidate) -> tuple[list[st
             for value in pair:
                 moved = base.copy()
                 moved[k] = value
-                gaps.append(problem.steps.gap(candidate.act(problem.plain, moved)))
+                gaps.append(problem.steps.gap(candidate.act(force_model, moved)))
         change = np.stack(gaps[1::2], axis=2) - np.stack(gaps[::2], axis=2)
         found[:, places] = problem.whitening_filter.white(change) * (size[places] / ends)
 

@@ -90,6 +90,11 @@ def build_allocation(scenario: Scenario, profile: Profile, curves: Curves) -> Al
     return Allocation(NSCA if fits and wanted != "pseudo-inverse" else PSEUDO_INVERSE, curves, x, turns, shares)
 
 
+def pushes_every_way(actuators: tuple[Actuator, ...]) -> bool:
+    """Return whether a force in every direction can be allocated to actuators, so that they can follow a path."""
+    return not any(one.kind == "propeller_rudder" for one in actuators) and _pseudo_inverse(actuators) is not None
+
+
 def _listed(actuators: tuple[Actuator, ...]) -> str:
     return ", ".join(f"{actuator.kind} at {actuator.position_m}" for actuator in actuators) or "none"
 

@@ -23,6 +23,10 @@ Triple = tuple[float, float, float]
 NONE, ZIGZAG, TURNING_CIRCLE, ON_THE_SPOT, RPM_STEPS = 0, 1, 2, 3, 4
 KINDS = ("", "zigzag", "turning-circle", "on-the-spot-turn", "rpm-steps")
 
+STEERING = "an azimuth thruster or a rudder aft of the body origin, or propellers beside the centre line"
+DIFFERENTIAL = 0.5
+"""Share of the speed that propellers beside the centre line give up or add to turn, whatever the helm's angle."""
+
 SIDE, START = 0, 1
 """Places in the state: the side that the helm is on (1 starboard, -1 port, 0 amidships), and the heading that the test
 started from [rad]."""
@@ -49,6 +53,8 @@ class Helm(NamedTuple):
         Share of the speed that pushes straight ahead: 1, -1 for a propeller that looks aft, or 0, shape (k,).
     steer
         Angle for each radian of helm: -1 for azimuth thrusters aft, which push the stern the other way, 1 for rudders.
+    differential
+        What is added to `ahead` to turn to starboard, of a vessel that steers by its propellers alone, shape (k,).
     spin_speed, spin_angle
         Share of the speed, and angle [rad], that turn the vessel to starboard on the spot, shape (k,).
     """
@@ -63,6 +69,7 @@ class Helm(NamedTuple):
     levels: Floats
     ahead: Floats
     steer: Floats
+    differential: Floats
     spin_speed: Floats
     spin_angle: Floats
 
@@ -76,6 +83,7 @@ def build_helm(scenario: Scenario, profile: Profile) -> tuple[Helm, Floats]:
         When the vessel has no actuator that the manoeuvre could be done with.
     """
     manoeuvre = scenario.manoeuvre
+    steer = np.array([_steer(actuator) for actuator in profile.actuators])
     helm = Helm(
         kind=KINDS.index(manoeuvre.kind),
         speed=manoeuvre.speed_rpm,
@@ -86,13 +94,14 @@ def build_helm(scenario: Scenario, profile: Profile) -> tuple[Helm, Floats]:
         hold_s=manoeuvre.hold_s,
         levels=np.array(manoeuvre.levels, dtype=np.float64),
         ahead=np.array([_ahead(actuator) for actuator in profile.actuators]),
-        steer=np.array([_steer(actuator) for actuator in profile.actuators]),
+        steer=steer,
+        differential=np.array([0.0 if steer.any() else _differential(actuator) for actuator in profile.actuators]),
         spin_speed=np.array([_spin(actuator)[0] for actuator in profile.actuators]),
         spin_angle=np.array([_spin(actuator)[1] for actuator in profile.actuators]),
     )
     needs = {
-        ZIGZAG: (helm.steer, "an azimuth thruster or a rudder aft of the body origin"),
-        TURNING_CIRCLE: (helm.steer, "an azimuth thruster or a rudder aft of the body origin"),
+        ZIGZAG: (helm.steer + helm.differential, STEERING),
+        TURNING_CIRCLE: (helm.steer + helm.differential, STEERING),
         ON_THE_SPOT: (helm.spin_speed, "an azimuth or a tunnel thruster fore or aft of the body origin"),
         RPM_STEPS: (helm.ahead, "an actuator that pushes ahead"),
     }
@@ -119,6 +128,11 @@ def _steer(actuator: Actuator) -> float:
     if actuator.kind == "propeller_rudder":
         return 1.0
     return -1.0 if actuator.kind == "azimuth" and actuator.position_m[0] < 0.0 else 0.0
+
+
+def _differential(actuator: Actuator) -> float:
+    """Return what a propeller beside the centre line adds to its share of the speed: it drives less on the side of the turn."""
+    return -DIFFERENTIAL * _ahead(actuator) * float(np.sign(actuator.position_m[1]))
 
 
 def _spin(actuator: Actuator) -> tuple[float, float]:
@@ -170,5 +184,5 @@ def helm(manoeuvre: Helm, mstate: Floats, t: float, eta: Triple, nu: Triple, ord
         elif manoeuvre.kind == ZIGZAG and mstate[SIDE] * (eta[2] - mstate[START]) >= manoeuvre.heading:
             mstate[SIDE] = -mstate[SIDE]
     for i in range(len(orders)):
-        orders[i, 0] = speed * manoeuvre.ahead[i]
+        orders[i, 0] = speed * (manoeuvre.ahead[i] + mstate[SIDE] * manoeuvre.differential[i])
         orders[i, 1] = mstate[SIDE] * manoeuvre.angle * manoeuvre.steer[i]

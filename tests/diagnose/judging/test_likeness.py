@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ferryid.diagnose.inference.estimation import fit
 from ferryid.diagnose.judging.likeness import Likeness, likeness, likeness_as_json, separation
 from ferryid.diagnose.judging.responses import Key, Responses, responses, together
 from ferryid.diagnose.judging.thresholds import JUDGING
@@ -150,7 +151,7 @@ TWELVE_CORNER = SCENARIO.replace('"points"\npoints = {}', '"twelve-corner"')
 @pytest.mark.slow
 def test_rivals_look_alike_on_one_heading_and_apart_on_many(tmp_path: Path) -> None:
     found = {
-        name: likeness(responses(trial_on(sailed(tmp_path, name, scenario, 3))))
+        name: likeness(responses(problem := trial_on(sailed(tmp_path, name, scenario, 3)), fit(problem, ())))
         for name, scenario in (("one", SCENARIO.format(ONE_HEADING)), ("many", TWELVE_CORNER))
     }
     mooring, payload, gain = ("mooring", None), ("payload", None), ("thruster_gain", "thruster1")

@@ -137,6 +137,20 @@ def test_rpm_steps_run_through_their_levels_over_and_over(steering):
         np.testing.assert_array_equal(orders(t), [(speed, 0.0), (speed, 0.0)])
 
 
+def test_a_vessel_without_rudder_turns_by_its_propellers_speeds(steering):
+    boat = replace(
+        FERRY, actuators=tuple(Actuator(name, "propeller", (-1.0, y), CURVE) for name, y in (("p", -0.5), ("s", 0.5)))
+    )
+    orders = steering(boat, "zigzag", speed_rpm=400.0, lead_s=10.0, heading_deg=20.0)
+    np.testing.assert_array_equal(orders(0.0)[:, 0], (400.0, 400.0))
+    starboard = orders(10.0)
+    np.testing.assert_array_equal(starboard[:, 0], (600.0, 200.0))
+    assert moment(boat, starboard)[2] > 0.0
+    np.testing.assert_array_equal(orders(20.0, np.radians(21.0))[:, 0], (200.0, 600.0))
+    # Where something can be turned, that steers.
+    np.testing.assert_array_equal(steering(FERRY, "zigzag", speed_rpm=400.0, lead_s=0.0)(1.0)[:, 0], (400.0, 400.0))
+
+
 def test_straight_ahead_is_ahead_for_propellers_that_look_aft(steering):
     orders = steering(MIXED, "rpm-steps", speed_rpm=800.0, levels=(1.0,))(0.0)
     np.testing.assert_array_equal(orders[:, 0], (0.0, 800.0, -800.0))
