@@ -5,16 +5,20 @@ from __future__ import annotations
 from dataclasses import replace
 from math import cos, radians, sqrt
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 
-from ferryid.diagnose.inference.estimation import fit
+from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, fit
 from ferryid.diagnose.judging.likeness import Likeness, likeness, likeness_as_json, separation
 from ferryid.diagnose.judging.responses import Key, Responses, responses, together
 from ferryid.diagnose.judging.thresholds import JUDGING
+from ferryid.effects.effect import Effect, Parameter
+from ferryid.effects.force_model import ForceModel, Measurements, hull_of
 from ferryid.types import Floats
-from tests.diagnose.trials import sailed, trial_on
+from tests.diagnose.trials import FERRY, sailed, trial_on
 
 ROWS, H = 40, 26
 RANDOM = np.random.default_rng(8)
@@ -141,6 +145,50 @@ def test_json_names_what_separates_a_pair_that_looks_alike() -> None:
     assert [one["alike"] for one in plain["pairs"][1:]] == [False, False]
     assert all(one["separating_manoeuvre"] is None for one in plain["pairs"][1:])
     assert separation(GAIN, GAIN).manoeuvre
+
+
+def spring(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+    """A pull along the first axis by stiffness, place, and a square of its own; the last parameter does nothing."""
+    x = np.arange(ROWS) / ROWS
+    pull = -p[0] * (x - p[1]) + p[2] * abs(p[2])
+    return replace(force_model, external=force_model.external + np.outer(pull, [1.0, 0.0, 0.0]))
+
+
+def test_every_parameter_goes_to_its_usual_size_and_an_idle_one_where_the_others_have_theirs() -> None:
+    parameters = (
+        Parameter("stiffness", "N/m", 2.0, 0.0, 100.0, start=0.5),
+        Parameter("place", "m", 10.0, -1e3, 1e3),
+        Parameter("square", "N", 3.0, -1e3, 1e3),
+        Parameter("nothing", "N", 1.0, -1e3, 1e3),
+    )
+    candidate = Candidate(
+        Effect("spring", "Spring", lambda profile: (), spring, lambda v, i: "", lambda v, i: {}), None, parameters
+    )
+    zero = np.zeros((ROWS, 3))
+    seen = Measurements(
+        FERRY, np.arange(ROWS) * 0.2, zero, zero, zero, np.zeros((ROWS, 2, 3)), zero, np.ones(ROWS, dtype=bool)
+    )
+    plain = ForceModel(seen, hull_of(FERRY), seen.parts, seen.angles, zero)
+    problem = cast(
+        EstimationProblem,
+        SimpleNamespace(
+            plain=plain,
+            hull_spread=np.zeros(H),
+            hull_slopes=lambda force_model: NO_HULL,
+            steps=SimpleNamespace(
+                measured=np.zeros((ROWS, 1)),
+                channels=np.array([True]),
+                gap=lambda force_model: force_model.external[:, :1],
+            ),
+            whitening_filter=SimpleNamespace(white=lambda gaps: gaps[:, 0]),
+        ),
+    )
+    found = responses(problem, Fit((), (), np.empty((0, 0)), plain.hull, 0.0), [candidate])
+    x = np.arange(ROWS) / ROWS
+    # From nothing to 2 N/m; half of what lies between -10 and 10 m with 2 N/m; half of what lies between -9 and 9 N.
+    expected = np.column_stack([-2.0 * x, np.full(ROWS, 20.0), np.full(ROWS, 9.0)])
+    assert [name for _, name in found.parameters] == ["stiffness", "place", "square"]
+    np.testing.assert_allclose(found.products[H:, H:], expected.T @ expected)
 
 
 SCENARIO = 'schema = "ferryid.scenario/1"\nvessel = "milliampere"\n[path]\nkind = "points"\npoints = {}\ndwell_s = 40\n'
