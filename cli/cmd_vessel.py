@@ -21,7 +21,7 @@ def check(
     identifiable: Annotated[
         bool,
         typer.Option(
-            "--identifiable", help="Simulate the vessel: which effects its sensors can tell apart, what would help."
+            "--identifiable", help="Simulate the vessel: which effects its sensors can distinguish, what would help."
         ),
     ] = False,
     json: Json = None,

@@ -295,14 +295,11 @@ def diagnose(
     verify
         Check every checksum of the logs.
     """
-    from ferryid.diagnose import DiagnosisSettings
-    from ferryid.report.diagnosis_report import diagnose_and_report, patient
+    from ferryid.report.diagnosis_report import diagnose_and_report
 
-    out = Path(out)
-    profile, examined = patient(vessel, model, out)
-    settings = replace(settings or DiagnosisSettings(), model=examined)
+    profile, examined = _examined(vessel, model, out, settings)
     run = _context(out, progress, verify)
-    outcome = diagnose_and_report(_paths(logs), profile, settings, run, name=name, command=command)
+    outcome = diagnose_and_report(_paths(logs), profile, examined, run, name=name, command=command)
     progress("")
     return outcome
 
@@ -333,17 +330,24 @@ def compare_groups(
     name
         Refused where not empty: no model comes of a comparison.
     """
-    from ferryid.diagnose import DiagnosisSettings
-    from ferryid.report.diagnosis_report import patient
     from ferryid.report.versus_report import compare_and_report
 
-    out = Path(out)
-    profile, examined = patient(vessel, model, out)
-    settings = replace(settings or DiagnosisSettings(), model=examined)
+    profile, examined = _examined(vessel, model, out, settings)
     run = _context(out, progress, verify)
-    outcome = compare_and_report(_paths(logs), _paths(versus), profile, settings, run, name=name, command=command)
+    outcome = compare_and_report(_paths(logs), _paths(versus), profile, examined, run, name=name, command=command)
     progress("")
     return outcome
+
+
+def _examined(
+    vessel: str | Path | Profile | None, model: str | None, out: str | Path, settings: DiagnosisSettings | None
+) -> tuple[Profile, DiagnosisSettings]:
+    """Return the vessel of a diagnosis, and its settings with the model that is examined."""
+    from ferryid.diagnose import DiagnosisSettings
+    from ferryid.report.diagnosis_report import patient
+
+    profile, examined = patient(vessel, model, Path(out))
+    return profile, replace(settings or DiagnosisSettings(), model=examined)
 
 
 def batch(
@@ -508,7 +512,7 @@ def check_vessel(file: str | Path, *, identifiable: bool = False, progress: Prog
     """Return every fault of a vessel profile with its line; ``json["faults"]`` is empty where there is none.
 
     With `identifiable`, a profile without faults is simulated, and ``json["identifiability"]`` has which effects its sensors
-    can tell apart, and what each further sensor adds.
+    can distinguish, and what each further sensor adds.
     """
     from ferryid.vessel import check_profile
 

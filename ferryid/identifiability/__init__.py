@@ -1,4 +1,4 @@
-"""Which effects the sensors of a profile can tell apart, on a simulated trial of its vessel: no log is needed."""
+"""Which effects the sensors of a profile can distinguish, on a simulated trial of its vessel: no log is needed."""
 
 from ferryid.identifiability.report import as_json, as_text
 from ferryid.identifiability.sensors import SENSORS

@@ -85,7 +85,7 @@ def _further(study: Study, name: str, one: Assessment) -> str:
         parts.append(f"distinguishes {counted(len(gained), 'more effect')} ({listed([_title(key) for key in gained])})")
     if lost:
         parts.append(f"no longer {listed([_title(key) for key in lost])}")
-    return f"{SENSORS[name]}: {', '.join(parts) or 'distinguishes no more'}"
+    return f"{SENSORS[name]}: {', '.join(parts if gained else ['distinguishes no more', *parts])}"
 
 
 def _line(likeness: Likeness, key: Key) -> str:

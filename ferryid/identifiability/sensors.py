@@ -21,7 +21,7 @@ SENSORS: Mapping[str, str] = {
     "payload": "a measurement of the load",
     FEEDBACK: "feedback of the actuators' speeds and angles",
 }
-"""Sensors that tell effects apart, by the quantity of a profile's signals; of actuators all feedback is one."""
+"""Sensors that distinguish effects, by the quantity of a profile's signals; of actuators all feedback is one."""
 MEASURES: Mapping[str, tuple[str, ...]] = {"wind": ("wind",), "current": ("current",), "payload": ("payload",)}
 """Effects that a sensor measures, so that none of them is left to be found."""
 ODOMETRY = "milliampere"

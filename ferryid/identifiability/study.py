@@ -1,4 +1,4 @@
-"""What each set of sensors tells apart on one simulated trial: the profile's own, and with each further sensor."""
+"""What each set of sensors distinguishes on one simulated trial: the profile's own, and with each further sensor."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ from ferryid.vessel.profile import Profile
 
 @dataclass(frozen=True)
 class Assessment:
-    """What a set of sensors tells apart.
+    """What a set of sensors distinguishes.
 
     Attributes
     ----------
     sensors
         Of `ferryid.identifiability.sensors.SENSORS`.
     likeness
-        On the trial; None where no force can be told from these sensors.
+        On the trial; None where these sensors show no force.
     measured
         Effects that a sensor measures.
     reason
-        Why nothing can be told; empty where something can.
+        Why they show none; empty where they do.
     """
 
     sensors: frozenset[str]
@@ -64,13 +64,13 @@ class Assessment:
 
     @property
     def score(self) -> tuple[int, int]:
-        """How much is told apart: the number of effects, then that of pairs that look alike, of which fewer are better."""
+        """How much is distinguished: the number of effects, then that of pairs that look alike, of which fewer are better."""
         return len(self.apart), 0 if self.likeness is None else -len(self.likeness.alike)
 
 
 @dataclass(frozen=True)
 class Study:
-    """What the sensors of a profile tell apart, and what each further one adds.
+    """What the sensors of a profile distinguish, and what each further one adds.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class Study:
     own
         With the sensors that the profile maps.
     with_further
-        With one more each, the one that tells apart most first.
+        With one more each, the one that distinguishes most first.
     """
 
     trial: Trial
@@ -88,7 +88,7 @@ class Study:
 
     @property
     def best(self) -> str | None:
-        """The further sensor that tells most apart; None where none tells more than the profile's own."""
+        """The further sensor that distinguishes most; None where none adds to the profile's own."""
         if self.with_further and self.with_further[0][1].score > self.own.score:
             return self.with_further[0][0]
         return None
@@ -121,7 +121,7 @@ def study(profile: Profile, progress: Callable[[str], None] = no_progress) -> St
 def _assessed(
     log: Path, profile: Profile, trial: Trial, sensors: frozenset[str], progress: Callable[[str], None]
 ) -> Assessment:
-    """Return what a set of sensors tells apart. Hull and its prior are the profile's own, whatever hull was simulated."""
+    """Return what a set of sensors distinguishes. Hull and its prior are the profile's own, whatever hull was simulated."""
     progress(f"looking at it with {len(sensors)} of {len(SENSORS)} sensors")
     measured = tuple(effect for name in SENSORS if name in sensors for effect in MEASURES.get(name, ()))
     known = replace(reading(trial.vessel, sensors), hull=profile.hull)

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import re
-import shlex
 from collections.abc import Sequence
-from datetime import UTC, datetime
 from pathlib import Path
 
-from ferryid import __version__
 from ferryid.compare import Coefficient, CommonErrors, Comparison, ComparisonResult
-from ferryid.files import dump_json, replacing
 from ferryid.report import comparison_words
 from ferryid.report.comparison_page import render
 from ferryid.report.comparison_words import render_effects
+from ferryid.report.folder import PAGE, made, write_folder
 from ferryid.report.outcome import Report
 
 NARROW = 3
@@ -35,20 +32,10 @@ def report(comparison: Comparison, out: Path, command: Sequence[str] = ()) -> Re
     """
     result = comparison.result
     folder = out / "reports" / _folder(result)
-    made = {
-        "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
-        "version": __version__,
-        "command": shlex.join(command),
-    }
-    file = folder / "report.html"
+    file = folder / PAGE
     plain = {**result.to_json(), "report": str(file)}
-    page, drawings = render(result, comparison.logs, made)
-    with replacing(folder) as temporary:
-        temporary.mkdir()
-        (temporary / file.name).write_text(page, encoding="utf-8", errors="backslashreplace")
-        for name, drawing in drawings.items():
-            (temporary / f"{name}.svg").write_text(drawing, encoding="utf-8", errors="backslashreplace")
-        (temporary / "compare.json").write_text(dump_json(plain), encoding="utf-8")
+    page, drawings = render(result, comparison.logs, made(command))
+    write_folder(folder, page, drawings, plain, "compare.json")
     return Report(plain, f"{as_text(result)}\n\nreport  {file}", file)
 
 

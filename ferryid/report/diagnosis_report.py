@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import re
-import shlex
 from collections.abc import Sequence
-from datetime import UTC, datetime
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from ferryid import __version__
 from ferryid.diagnose import (
     SCHEMA,
     Diagnosis,
@@ -22,12 +19,13 @@ from ferryid.diagnose import (
     to_json,
 )
 from ferryid.errors import FerryIdError
-from ferryid.files import dump_json, finite, replacing
+from ferryid.files import finite
 from ferryid.models import Model
 from ferryid.models.store import load
 from ferryid.report import second_sources
 from ferryid.report.diagnosis_page import as_text, render
 from ferryid.report.diagnosis_words import findings_of, findings_of_all
+from ferryid.report.folder import PAGE, made, write_folder
 from ferryid.report.outcome import Report
 from ferryid.types import AXES, RunContext
 from ferryid.vessel import load_profile, parse_profile
@@ -108,20 +106,10 @@ def report(diagnoses: Sequence[Diagnosis], out: Path, command: Sequence[str] = (
     names = ", ".join(one.log for one in diagnoses[:2]) + (
         f" and {len(diagnoses) - 2} more" if len(diagnoses) > 2 else ""
     )
-    made = {
-        "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
-        "version": __version__,
-        "command": shlex.join(command),
-    }
-    page, drawings = render(diagnoses, f"{diagnoses[0].vessel} · {names}", made)
-    file = folder / "report.html"
+    page, drawings = render(diagnoses, f"{diagnoses[0].vessel} · {names}", made(command))
+    file = folder / PAGE
     plain = {**finite(as_json(diagnoses)), "report": str(file)}
-    with replacing(folder) as temporary:
-        temporary.mkdir()
-        (temporary / file.name).write_text(page, encoding="utf-8", errors="backslashreplace")
-        for name, drawing in drawings.items():
-            (temporary / f"{name}.svg").write_text(drawing, encoding="utf-8", errors="backslashreplace")
-        (temporary / "diagnosis.json").write_text(dump_json(plain), encoding="utf-8")
+    write_folder(folder, page, drawings, plain, "diagnosis.json")
     return Report(plain, f"{as_text(diagnoses)}\nreport  {file}", file)
 
 

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.files import alone, dump_json, replacing
+from ferryid.files import alone
 from ferryid.identify import FitOutcome, FitSettings, fit_archive, fit_logs
 from ferryid.models.store import StoredModel, assign_version, plan, save
+from ferryid.report.folder import PAGE, write_folder
 from ferryid.report.model_text import describe_settings
 from ferryid.report.outcome import Report
 from ferryid.report.page import headline, render
@@ -82,17 +83,10 @@ def _reported(result: FitOutcome, run: RunContext) -> FitReport:
         folder = out / "reports" / f"{result.model.name}-v{result.model.version}"
         page, drawings = render(result)
         stored = plan(result.model, out)
-        plain = as_json(result, stored, folder / "report.html")
-        with replacing(folder) as temporary:
-            temporary.mkdir()
-            (temporary / "report.html").write_text(page, encoding="utf-8", errors="backslashreplace")
-            for file, drawing in drawings.items():
-                (temporary / f"{file}.svg").write_text(drawing, encoding="utf-8", errors="backslashreplace")
-            (temporary / "fit.json").write_text(dump_json(plain), encoding="utf-8")
-            # Last before the report takes its place: a full disk or an interrupt leaves neither without the other.
-            save(result.model, out)
+        plain = as_json(result, stored, folder / PAGE)
+        write_folder(folder, page, drawings, plain, "fit.json", last=lambda: save(result.model, out))
     run.progress("")
-    report = folder / "report.html"
+    report = folder / PAGE
     return FitReport(plain, as_text(result, stored, report), report, stored)
 
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from ferryid.files import dump_json, replacing
 from ferryid.identify import FOLDS, FitSettings
 from ferryid.identify.sweeps import BY, Sweep, sweep_json, sweep_settings
+from ferryid.report.folder import PAGE, write_folder
 from ferryid.report.html import template
 from ferryid.report.outcome import Report
 from ferryid.report.sweep_figures import curves, heat_map
@@ -47,14 +46,9 @@ def leave(
     """Write page, drawings and JSON of a sweep into its folder; `json_of` returns the JSON for the page's path."""
     first = str(logs[0]["name"])
     more = f"-and-{len(logs) - 1}-more" if len(logs) > 1 else ""
-    report = run.out / "reports" / f"sweep-{what}-{first}{more}" / "report.html"
+    report = run.out / "reports" / f"sweep-{what}-{first}{more}" / PAGE
     plain = json_of(str(report))
-    with replacing(report.parent) as temporary:
-        os.makedirs(temporary)
-        (temporary / "report.html").write_text(page, encoding="utf-8", errors="backslashreplace")
-        for name, drawing in drawings.items():
-            (temporary / f"{name}.svg").write_text(drawing, encoding="utf-8", errors="backslashreplace")
-        (temporary / "sweep.json").write_text(dump_json(plain), encoding="utf-8")
+    write_folder(report.parent, page, drawings, plain, "sweep.json")
     run.progress("")
     return Report(plain, f"{text}\nreport  {report}", report)
 

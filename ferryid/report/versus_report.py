@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import re
-import shlex
 from collections.abc import Sequence
-from datetime import UTC, datetime
 from typing import Any
 
-from ferryid import __version__
 from ferryid.counts import counted
 from ferryid.diagnose import GROUPS, JUDGING, DiagnosisSettings, Difference, Versus, compare_groups, versus_json
 from ferryid.errors import FerryIdError
-from ferryid.files import dump_json, finite, replacing
+from ferryid.files import finite
+from ferryid.report.folder import PAGE, made, write_folder
 from ferryid.report.html import template
 from ferryid.report.outcome import Report
 from ferryid.report.versus_figures import intervals
@@ -52,14 +50,9 @@ def compare_and_report(
     run.progress("writing the report")
     page, drawings = render(found, command)
     folder = run.out / "reports" / _folder(found)
-    file = folder / "report.html"
+    file = folder / PAGE
     plain = {**finite(versus_json(found)), "report": str(file)}
-    with replacing(folder) as temporary:
-        temporary.mkdir()
-        (temporary / file.name).write_text(page, encoding="utf-8", errors="backslashreplace")
-        for key, drawing in drawings.items():
-            (temporary / f"{key}.svg").write_text(drawing, encoding="utf-8", errors="backslashreplace")
-        (temporary / "versus.json").write_text(dump_json(plain), encoding="utf-8")
+    write_folder(folder, page, drawings, plain, "versus.json")
     return Report(plain, f"{as_text(found)}\nreport  {file}", file)
 
 
@@ -108,11 +101,7 @@ def render(found: Versus, command: Sequence[str] = ()) -> tuple[str, dict[str, s
     rows = [_row(one, True) for one in found.judged.differences] + [_row(one, False) for one in found.judged.compared]
     page = template("versus.html").render(
         vessel=found.vessel,
-        made={
-            "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
-            "version": __version__,
-            "command": shlex.join(command),
-        },
+        made=made(command),
         summary=found.summary,
         differences=[
             {
@@ -128,7 +117,6 @@ def render(found: Versus, command: Sequence[str] = ()) -> tuple[str, dict[str, s
         rows=rows,
         groups=found.groups,
         notes=found.notes,
-        smallest=found.smallest,
     )
     return page, drawings
 
@@ -147,10 +135,7 @@ def _row(one: Difference, selected: bool) -> dict[str, Any]:
     return {
         "title": one.title if one.group == GROUPS[1] else f"{one.title}, {one.group} relative to {one.other}",
         "parameters": [one.said(each) for each in one.candidate.parameters if each.name in one.estimates],
-        "smallest": [
-            "not seen at any size" if least is None else f"{name.replace('_', ' ')} {least:.2g}"
-            for name, least in one.smallest.items()
-        ],
+        "smallest": [one.seen_from(name) for name in one.smallest],
         "evidence": f"{one.evidence:+.0f}",
         "selected": selected and not one.doubt,
         "verdict": ("hint" if one.doubt else "differs") if selected else "no difference seen",

@@ -116,6 +116,14 @@ class Difference:
             return f"{self.candidate.effect.title} (all actuators alike)"
         return self.candidate.title
 
+    def seen_from(self, name: str) -> str:
+        """Return the smallest difference of a parameter that would have been seen, with its unit."""
+        least, label = self.smallest[name], name.replace("_", " ")
+        if least is None:
+            return f"{label} not seen at any size"
+        unit = next(each.unit for each in self.candidate.parameters if each.name == name)
+        return f"{label} {100.0 * least:.0f} %" if unit == "-" else f"{label} {least:.2g} {unit}"
+
     def said(self, parameter: Parameter) -> str:
         """Return a parameter with its interval."""
         one = self.estimates[parameter.name]
@@ -310,10 +318,8 @@ def smallest_note(judged: JudgedGroups) -> str:
     parts = []
     for one in judged.compared:
         for name, least in one.smallest.items():
-            unit = next(each.unit for each in one.candidate.parameters if each.name == name)
             if least is not None:
-                of = f"{100.0 * least:.2g} %" if unit == "-" else f"{least:.2g} {unit}"
-                parts.append(f"{one.title}, {name.replace('_', ' ')} {of}")
+                parts.append(f"{one.title}, {one.seen_from(name)}")
     return f"Would have been seen with an even chance, from: {'; '.join(parts)}." if parts else ""
 
 
