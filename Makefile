@@ -61,7 +61,8 @@ attack: $(VENV)/installed
 real: $(VENV)/installed
 	$(BIN)/python -m tests.real
 
-# Campaigns of the same recordings, with the wind withheld and in still air: writes reports/campaign.md.
+# Campaigns of the same recordings, with the wind withheld and in still air, groups of logs, other instruments: writes
+# reports/campaign.md.
 campaign: $(VENV)/installed
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.real campaign
 

@@ -26,7 +26,7 @@ from ferryid.types import AXES, IN_MEMORY, RunContext
 from ferryid.vessel import load_profile
 from ferryid.vessel.profile import Profile
 from tests.evidence import stamp
-from tests.real import esso
+from tests.real import esso, groups, instruments
 from tests.real.places import DATA, REPORTS
 
 ENVIRONMENT = ("wind", "current", "waves", "mooring", "gusts", "shallow_water")
@@ -56,6 +56,8 @@ def write() -> None:
         parts.append(section(esso.study(kind), title))
     print("KVLCC2, VTec", flush=True)
     parts += [tank(), pool()]
+    print("Groups of logs, other instruments", flush=True)
+    parts += [groups.section(), instruments.section()]
     minutes = (time.monotonic() - began) / 60.0
     parts.append(
         f"\nMade in {minutes:.0f} minutes on {os.cpu_count()} processors with a load of {load:.1f} at the start.\n"
