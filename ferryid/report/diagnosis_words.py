@@ -33,6 +33,7 @@ SIGN = (
     "What is left over is model minus measured, as a force along the vessel's axes: a push that the model lacks shows with its "
     "sign turned round."
 )
+UNITS = {"surge": "N", "sway": "N", "yaw": "N·m"}
 NAMES = {
     "seconds": "delay",
     "per_mps": "loss by the speed of the inflow",
@@ -183,7 +184,19 @@ def trust(finding: Finding) -> str:
     if not change:
         return told
     data = "data that it was not fitted to" if finding.held_out else "the very data that it was fitted to"
-    return f"{told} With it, the squared force error on {data} {change}."
+    return f"{told} With it, the squared force error on {data} {change}{_in_figures(finding)}."
+
+
+def _in_figures(finding: Finding) -> str:
+    """Return the root-mean-square force error without and with a finding, on the axes on which it changes."""
+    if finding.mse is None:
+        return ""
+    parts = [
+        f"{axis} {finding.mse[0][axis] ** 0.5:.3g} to {finding.mse[1][axis] ** 0.5:.3g} {UNITS[axis]}"
+        for axis in AXES
+        if abs(finding.improvement.get(axis, 0.0)) >= JUDGING.reported_change
+    ]
+    return f" (root mean square: {', '.join(parts)})" if parts else ""
 
 
 def probability(value: float) -> str:

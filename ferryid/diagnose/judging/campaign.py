@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 from ferryid.diagnose.inference.campaign import CommonHull
+from ferryid.diagnose.inference.campaign_estimation import CampaignFit, estimate_campaign
 from ferryid.diagnose.inference.campaign_model import Campaign
+from ferryid.diagnose.inference.force_errors import mass_of
 from ferryid.diagnose.judging.campaign_conditions import JudgedConditions, judge_conditions, note
+from ferryid.diagnose.judging.campaign_errors import LogErrors
+from ferryid.diagnose.judging.campaign_evidence import HeldOutLoss, held_out_loss, without_conditions
 from ferryid.diagnose.judging.campaign_properties import PropertyTest, judge_properties, tested
 from ferryid.diagnose.judging.claims import Claim, Figures
+from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.posterior import HullPosterior
-from ferryid.effects.force_model import COEFFICIENTS
+from ferryid.effects.force_model import COEFFICIENTS, ForceModel
 
 
 @dataclass(frozen=True)
@@ -25,10 +30,15 @@ class JudgedCampaign:
         Of each log, with the hull of all.
     properties
         Of the vessel.
+    bare, loss
+        The logs without what is confirmed, under the same noise, and the loss of held-out blocks without and with it; None
+        where nothing is confirmed.
     """
 
     conditions: JudgedConditions
     properties: tuple[PropertyTest, ...]
+    bare: CampaignFit | None = None
+    loss: tuple[HeldOutLoss, HeldOutLoss] | None = None
 
     @property
     def hull(self) -> CommonHull:
@@ -58,19 +68,58 @@ class JudgedCampaign:
         lasting = (one.finding(windows) for one in self.properties)
         return (*self.conditions.claims(path), *(Claim(one, Figures("property")) for one in lasting))
 
+    def errors(self, path: str, findings: Sequence[Finding]) -> LogErrors | None:
+        """Return the held-out errors of a log without and with what is confirmed over all logs; None where it shows none of it.
+
+        `findings` are those of the log as they are reported.
+        """
+        i, made = self.hull.place.get(path), self.hull.fit
+        confirmed = {one.key for one in (*made.campaign.conditions, *made.campaign.properties)}
+        if i is None or self.loss is None or not any(one.key in confirmed and one.sure for one in findings):
+            return None
+        return LogErrors.of(made, self.loss, i)
+
+    def force_models(self, path: str) -> tuple[ForceModel, ForceModel] | None:
+        """Return a log's force models without and with what is confirmed; None where nothing is."""
+        i = self.hull.place.get(path)
+        if i is None or self.bare is None:
+            return None
+        return _whole(self.bare, i), _whole(self.hull.fit, i)
+
+
+def _whole(made: CampaignFit, i: int) -> ForceModel:
+    """Return a log's force model at an estimate, with its steady acceleration as a force."""
+    force_model = made.force_model(i)
+    return replace(force_model, external=force_model.external + mass_of(force_model.hull) @ made.own[i, -3:])
+
 
 def judge_campaign(campaign: Campaign, place: Mapping[str, int], progress: Callable[[str], None]) -> JudgedCampaign:
     """Judge what several logs say together: conditions, then properties beside them, then conditions beside these."""
     conditions = judge_conditions(campaign, place, progress)
     properties = judge_properties(conditions.hull.fit, progress)
     confirmed = tuple(one.candidate for one in properties if one.confirmed)
-    if not confirmed:
-        return JudgedCampaign(conditions, properties)
-    conditions = judge_conditions(replace(campaign, properties=confirmed), place, progress)
+    if confirmed:
+        conditions = judge_conditions(replace(campaign, properties=confirmed), place, progress)
+        made = conditions.hull.fit
+        again = {one.key: tested(made, one, ()) for one in made.campaign.properties}
+        properties = tuple(
+            replace(again[one.candidate.key], rivals=one.rivals) if one.candidate.key in again else one
+            for one in properties
+        )
+    return JudgedCampaign(conditions, properties, *_without_confirmed(conditions))
+
+
+def _without_confirmed(
+    conditions: JudgedConditions,
+) -> tuple[CampaignFit | None, tuple[HeldOutLoss, HeldOutLoss] | None]:
+    """Return the logs without what is confirmed, and the loss of held-out blocks without and with it."""
     made = conditions.hull.fit
-    again = {one.key: tested(made, one, ()) for one in made.campaign.properties}
-    beside = tuple(
-        replace(again[one.candidate.key], rivals=one.rivals) if one.candidate.key in again else one
-        for one in properties
-    )
-    return JudgedCampaign(conditions, beside)
+    if not (made.campaign.conditions or made.campaign.properties):
+        return None, None
+    if not made.campaign.properties:
+        for one in conditions.tests:
+            if one.fit is made:
+                return one.none, one.loss
+    bare = replace(without_conditions(made.campaign), properties=())
+    none = estimate_campaign(bare, noise=made.noise)
+    return none, (held_out_loss(none), held_out_loss(made))

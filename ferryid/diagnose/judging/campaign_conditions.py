@@ -14,6 +14,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from math import exp
+from typing import Any
 
 import numpy as np
 
@@ -23,8 +24,8 @@ from ferryid.diagnose.inference.campaign import CommonHull
 from ferryid.diagnose.inference.campaign_course import estimate_courses
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit, estimate_campaign
 from ferryid.diagnose.inference.campaign_model import Campaign
-from ferryid.diagnose.inference.force_errors import mass_of
 from ferryid.diagnose.inference.thresholds import INFERENCE
+from ferryid.diagnose.judging.campaign_errors import LogErrors
 from ferryid.diagnose.judging.campaign_evidence import (
     Gain,
     HeldOutLoss,
@@ -34,6 +35,7 @@ from ferryid.diagnose.judging.campaign_evidence import (
     without_conditions,
 )
 from ferryid.diagnose.judging.claims import Claim, Figures
+from ferryid.diagnose.judging.figure_data import axis_of_errors, error_columns
 from ferryid.diagnose.judging.finding import Finding, Rival
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
@@ -81,6 +83,8 @@ class ConditionTest:
         Its id.
     fit, none
         The logs with it and without, under one noise.
+    loss
+        Of held-out blocks, without it and with it.
     evidence
         Logarithm of the evidence over that of no such condition [nat].
     gain
@@ -227,15 +231,15 @@ def _finding(test: ConditionTest, i: int, tests: tuple[ConditionTest, ...]) -> F
         one.name: Estimate.normal(float(at), float(e), one.unit)
         for one, at, e in zip(parameters, value, error, strict=True)
     }
-    improvement = _improvement(test, i)
+    errors = LogErrors.of(fit, test.loss, i)
+    improvement = errors.removed
     gained = np.maximum(improvement, 0.0)
     shares = gained / gained.sum() if gained.any() else np.zeros(3)
     effect = effects()[test.effect]
     says = effect.says({name: one.value for name, one in estimates.items()}, None)
     if not test.confirmed:
         says = f"{says} It is estimated from all logs together, not confirmed: {test.doubt}."
-    windows = fit.campaign.members[i].windows
-    t = windows.measurements.t
+    t = errors.windows.measurements.t
     return Finding(
         effect=test.effect,
         instance=None,
@@ -244,21 +248,23 @@ def _finding(test: ConditionTest, i: int, tests: tuple[ConditionTest, ...]) -> F
         axes=dict(zip(AXES, shares.tolist(), strict=True)),
         intervals=((float(t[0]), float(t[-1])),),
         improvement=dict(zip(AXES, improvement.tolist(), strict=True)),
+        mse=errors.mse,
         held_out=True,
         rivals=tuple(
             Rival(one.effect, None, one.evidence - test.evidence) for one in tests if one.effect != test.effect
         ),
         says=says,
-        evidence={"t": windows.middle_s},
         course=test.courses[i] if test.courses else None,
+        **_figure(test, i, errors, shares, value),
     )
 
 
-def _improvement(test: ConditionTest, i: int) -> Floats:
-    """Return the share of the held-out squared force error of a log that a condition removes, by axis, shape (3,)."""
-    M = mass_of(test.fit.campaign.members[i].plain.hull)
-    before, after = (np.mean((one.errors[i] @ M.T) ** 2, axis=0) for one in test.loss)
-    return np.asarray(1.0 - after / np.where(before > 0.0, before, np.inf))
+def _figure(test: ConditionTest, i: int, errors: LogErrors, shares: Floats, value: Floats) -> dict[str, Any]:
+    """Return the columns of the figure of a log's condition: held-out errors against what gives it away."""
+    condition, axis = test.fit.campaign.conditions[0], axis_of_errors(errors.before, errors.after, shares)
+    regressor = condition.effect.regressor
+    known = None if regressor is None else regressor(test.none.force_model(i), value, None, AXES[axis])
+    return error_columns(errors.windows, (errors.before, errors.after), axis, known)
 
 
 def note(test: ConditionTest, logs: int) -> str:

@@ -11,7 +11,7 @@ estimated; spreads and noise are those of all logs.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -22,6 +22,7 @@ from ferryid.diagnose.inference.campaign_model import Campaign, Member
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.folds import draws
 from ferryid.diagnose.inference.thresholds import INFERENCE
+from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.parallel import over
 from ferryid.effects.force_model import ForceModel
@@ -78,23 +79,30 @@ def _log_loss(made: CampaignFit, i: int) -> tuple[Floats, Floats]:
     windows, own = campaign.members[i].windows, made.own[i]
     errors, slopes = campaign.linearised(i, made.common, own, campaign.hull_slopes(i, made.common, own))
     C = made.covariance(i)
+    squares = []
+    for block, near in held_out_blocks(windows):
+        J, w = part.slopes[near].reshape(-1, C.shape[0]), part.gaps[near].ravel()
+        unknown = np.eye(len(w)) - J @ C @ J.T
+        shift = C @ (J.T @ np.linalg.solve(unknown, w))
+        left = part.gaps[block] + part.slopes[block] @ shift
+        squares.append(float(np.sum(left**2)))
+        errors[block] += slopes[block] @ shift
+    return np.array(squares), errors
+
+
+def held_out_blocks(windows: Windows) -> Iterator[tuple[slice, slice]]:
+    """Yield each block of a log that is held out, and the windows about it that know it.
+
+    Windows overlap, and the noise's colour reaches back: those within a window's length know the block.
+    """
     stride = max(1, int(np.median(np.diff(windows.starts)))) if len(windows.starts) > 1 else 1
-    # Windows overlap, and the noise's colour reaches back: those within a window's length know the block.
     purge = -(-len(windows.weight) // stride)
     length = max(1, round(INFERENCE.block_windows * len(windows.weight) / stride))
-    squares = []
     for first, end in windows.runs:
         count = max(1, round((end - first) / length))
         edges = np.linspace(first, end, count + 1).round().astype(int).tolist()
         for begin, stop in pairwise(edges):
-            near = slice(max(first, begin - purge), min(end, stop + purge))
-            J, w = part.slopes[near].reshape(-1, C.shape[0]), part.gaps[near].ravel()
-            unknown = np.eye(len(w)) - J @ C @ J.T
-            shift = C @ (J.T @ np.linalg.solve(unknown, w))
-            left = part.gaps[begin:stop] + part.slopes[begin:stop] @ shift
-            squares.append(float(np.sum(left**2)))
-            errors[begin:stop] += slopes[begin:stop] @ shift
-    return np.array(squares), errors
+            yield slice(begin, stop), slice(max(first, begin - purge), min(end, stop + purge))
 
 
 def placebos(campaign: Campaign) -> dict[str, Campaign]:

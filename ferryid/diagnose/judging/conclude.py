@@ -16,6 +16,7 @@ from ferryid.diagnose.inference.campaign import repeated
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted_force_model
 from ferryid.diagnose.inference.force_errors import force_errors, mass_of
 from ferryid.diagnose.inference.stages import AveragedLog, Baseline
+from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.campaign import JudgedCampaign
 from ferryid.diagnose.judging.campaign_posterior import campaign_posterior
 from ferryid.diagnose.judging.claims import Claim, Key, LogFigures
@@ -33,7 +34,7 @@ from ferryid.diagnose.judging.held_out import HeldOutEvidence, Improvement
 from ferryid.diagnose.judging.hidden_signal import compare_hidden_signals
 from ferryid.diagnose.judging.judge import JudgedLog, sensor_claims
 from ferryid.diagnose.judging.likeness import likeness_of_logs
-from ferryid.diagnose.judging.locate import locate
+from ferryid.diagnose.judging.locate import locate, locate_between
 from ferryid.diagnose.judging.posterior import posterior_of
 from ferryid.diagnose.judging.verdict import Remainder, verdict_of
 from ferryid.effects.force_model import COEFFICIENTS, UNITS
@@ -76,9 +77,11 @@ def conclude(
     single, of_all = likeness_of_logs(judged, together, same)
     found = tuple(
         _with_origin(
-            _concluded(by_path[one.path], claims[one.path], campaign, (*_copied(same.get(one.path)), *noted))
+            _concluded(by_path[one.path], claims[one.path], campaign, (*_copied(same.get(one.path)), *noted), together)
             if one.path in by_path
-            else _too_short(one, claims[one.path], baseline, campaign, (*_copied(same.get(one.path)), *noted)),
+            else _too_short(
+                one, claims[one.path], baseline, campaign, (*_copied(same.get(one.path)), *noted), together
+            ),
             one,
             together,
             same.get(one.path),
@@ -126,6 +129,7 @@ def _too_short(
     baseline: Baseline,
     campaign: tuple[frozenset[Key], ...],
     noted: tuple[str, ...],
+    together: JudgedCampaign | None,
 ) -> Diagnosis:
     screened = log.screened
     figures = LogFigures(joint=baseline.joint, campaign=campaign, baseline_sensors=baseline.sensors)
@@ -136,14 +140,17 @@ def _too_short(
         "Record at least ten minutes that excite every axis."
     )
     remainder = Remainder(testable=False)
+    errors = None if together is None else together.errors(log.path, findings)
+    before, after = ({}, {}) if errors is None else errors.scores(window_s)
     return Diagnosis(
         screened.measured.survey.motion.log,
         profile.name,
         verdict_of(findings, remainder),
         findings,
-        {},
-        {},
+        before,
+        after,
         (*survey_notes(screened), *noted, short, *notes),
+        evidence={} if errors is None else _leftover(errors.windows, errors.before, errors.after),
         duration_s=_duration_s(screened),
         left_out=screened.measured.survey.motion.left_out,
         remainder=remainder,
@@ -151,7 +158,11 @@ def _too_short(
 
 
 def _concluded(
-    log: JudgedLog, claims: Sequence[Claim], campaign: tuple[frozenset[Key], ...], noted: tuple[str, ...]
+    log: JudgedLog,
+    claims: Sequence[Claim],
+    campaign: tuple[frozenset[Key], ...],
+    noted: tuple[str, ...],
+    together: JudgedCampaign | None,
 ) -> Diagnosis:
     selected, stands = log.selected, log.stands
     estimated = selected.estimated
@@ -161,8 +172,22 @@ def _concluded(
     findings, rule_notes = apply_rules(claims, figures)
     chances, still = detection_powers(problem, kept, selected.steady), unexcited_axes(problem)
     before, after = _scores(problem, log.base, kept, stands.proof)
+    mse = after["mse"]
+    errors = None if together is None else together.errors(selected.path, findings)
+    leftover = [
+        force_errors(problem.windows, fitted_force_model(problem.plain, one), problem.plain) for one in (log.base, kept)
+    ]
+    located = locate(problem, log.base, kept, measurements) if kept.candidates else log.unknown.left
+    if together is not None and errors is not None:
+        # What all logs confirm acts in the force model that the log is compared with: without it, there is more.
+        if stands.proof is not None and kept.candidates:
+            errors = errors.beside(stands.proof.whole.before, stands.proof.whole.after)
+        before, after = _joined(errors.scores(before["window_s"]), (before, after))
+        leftover = [errors.before, errors.after]
+        if not kept.candidates and (models := together.force_models(selected.path)) is not None:
+            located = locate_between(problem, models, measurements)
     ratio = {axis: Estimate(unit="-", **one) for axis, one in after.get("ratio", {}).items()}
-    left = {axis: share for axis, share in _left_shares(problem, after["mse"]).items() if axis not in still}
+    left = {axis: share for axis, share in _left_shares(problem, mse).items() if axis not in still}
     remainder = Remainder(is_testable(chances, still), bool(stands.dropped), ratio, left)
     notes = (
         *survey_notes(screened),
@@ -184,8 +209,8 @@ def _concluded(
         before,
         after,
         notes,
-        evidence=_leftover(problem, log.base, kept),
-        located=locate(problem, log.base, kept, measurements) if kept.candidates else log.unknown.left,
+        evidence=_leftover(problem.windows, *leftover),
+        located=located,
         withheld=compare_hidden_signals(survey.hidden, measurements, findings),
         against=estimated.expectation.comparison,
         moved=_moved(problem, kept) if kept.candidates else None,
@@ -273,14 +298,24 @@ def _free_run(runs: FreeRuns, errors: Floats) -> dict[str, Any]:
     return {"horizons_s": runs.horizons_s.tolist(), **columns, "starts": runs.starts, "note": ""}
 
 
-def _leftover(problem: EstimationProblem, base: Fit, kept: Fit) -> dict[str, Any]:
-    windows = problem.windows
+def _joined(
+    campaign: tuple[dict[str, Any], dict[str, Any]], own: tuple[Mapping[str, Any], Mapping[str, Any]]
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the scores of a log with what its campaign confirms, beside the free runs of its own findings alone."""
+    before, after = ({**one, "free_run": alone.get("free_run", {})} for one, alone in zip(campaign, own, strict=True))
+    if before["free_run"]:
+        note = "what all logs confirm acts in both, and the findings of this log alone in the second only"
+        before["free_run"] = {**before["free_run"], "note": note}
+    return before, after
+
+
+def _leftover(windows: Windows, before: Floats, after: Floats) -> dict[str, Any]:
     psi = windows.mean(windows.measurements.psi[:, None])[:, 0]
     speed = windows.mean(np.hypot(windows.measurements.nu[:, 0], windows.measurements.nu[:, 1])[:, None])[:, 0]
     return {
         "t": windows.middle_s,
-        "before": force_errors(windows, fitted_force_model(problem.plain, base), problem.plain),
-        "after": force_errors(windows, fitted_force_model(problem.plain, kept), problem.plain),
+        "before": before,
+        "after": after,
         "heading": np.degrees(np.mod(psi, 2.0 * np.pi)),
         "speed": speed,
     }

@@ -208,6 +208,7 @@ def finding_as_json(one: Finding) -> dict[str, Any]:
             **({"law": [{**vars(term), "coefficient": vars(term.coefficient)} for term in one.law]} if one.law else {}),
         },
         "improvement": dict(one.improvement),
+        **({} if one.mse is None else {"mse": dict(zip(("before", "after"), map(dict, one.mse), strict=True))}),
         "held_out": one.held_out,
         "rivals": [vars(rival) for rival in one.rivals],
         "unresolved_with": list(one.unresolved_with),

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem
+from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.locate import Location
 from ferryid.effects.force_model import ForceModel
 from ferryid.types import AXES, Floats
@@ -28,9 +29,20 @@ def figure_columns(
     alone
         True where nothing explains what is left over.
     """
-    axis = best_axis(place)
-    before, after = place.before[:, axis], place.after[:, axis]
-    columns = {"t": place.middle_s, "before": before}
+    return error_columns(problem.windows, (place.before, place.after), best_axis(place), regressor, alone=alone)
+
+
+def error_columns(
+    windows: Windows,
+    errors: tuple[Floats, Floats],
+    axis: int,
+    regressor: tuple[str, Floats] | None,
+    *,
+    alone: bool = False,
+) -> dict[str, Any]:
+    """Return the same of force errors of every window without and with a finding, shape (J, 3) each, on one axis."""
+    before, after = (one[:, axis] for one in errors)
+    columns = {"t": windows.middle_s, "before": before}
     if not alone:
         # Of the model's error, what the finding adds takes away.
         columns |= {"after": after, "explained": before - after}
@@ -38,7 +50,7 @@ def figure_columns(
     labels = {"residual": f"{AXES[axis]} {kind} left over [{unit}]"}
     if regressor is not None:
         label, values = regressor
-        columns["regressor"] = _in_windows(problem, label, values)
+        columns["regressor"] = _in_windows(windows, label, values)
         labels["regressor"] = label
     return {"evidence": columns, "labels": labels}
 
@@ -48,8 +60,13 @@ def best_axis(place: Location) -> int:
 
     Where nothing is added, it is the axis with the greatest share.
     """
-    added = np.mean((place.before - place.after) ** 2, axis=0)
-    return int(np.argmax(added / np.mean(place.after**2, axis=0) if added.any() else place.shares))
+    return axis_of_errors(place.before, place.after, place.shares)
+
+
+def axis_of_errors(before: Floats, after: Floats, shares: Floats) -> int:
+    """Return the same axis of force errors of every window, shape (J, 3), and the shares of the axes, shape (3,)."""
+    added = np.mean((before - after) ** 2, axis=0)
+    return int(np.argmax(added / np.mean(after**2, axis=0) if added.any() else shares))
 
 
 def figure_regressor(
@@ -60,9 +77,8 @@ def figure_regressor(
     return None if name is None else name(force_model, values, candidate.instance, AXES[best_axis(place)])
 
 
-def _in_windows(problem: EstimationProblem, label: str, values: Floats) -> Floats:
+def _in_windows(windows: Windows, label: str, values: Floats) -> Floats:
     """Return a quantity in every window: its mean, as forces are shown, but of an angle the one in the middle."""
-    windows = problem.windows
     if label.endswith("[deg]"):
         return np.asarray(values[windows.starts + len(windows.weight) // 2])
     return windows.mean(values[:, None])[:, 0]

@@ -55,8 +55,11 @@ class Finding:
         Where it shows most, in words.
     improvement
         Fraction of the held-out force MSE removed, by axis.
+    mse
+        The same in figures: mean square of the force error [N², N², N²m²] without and with the finding, by axis; None where it
+        was not measured.
     held_out
-        True where that was measured on rows that the finding was not fitted to.
+        True where these were measured on rows that the finding was not fitted to.
     rivals, unresolved_with
         What else was considered, and what this log cannot tell it from.
     separating_manoeuvre
@@ -95,6 +98,7 @@ class Finding:
     offset_s: float | None = None
     regime: str = ""
     improvement: Mapping[str, float] = field(default_factory=dict)
+    mse: tuple[Mapping[str, float], Mapping[str, float]] | None = None
     held_out: bool = False
     rivals: tuple[Rival, ...] = ()
     unresolved_with: tuple[str, ...] = ()

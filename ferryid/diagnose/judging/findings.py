@@ -94,6 +94,7 @@ def _force_claim(
         offset_s=_value(estimates, "offset"),
         regime=place.regime,
         improvement={} if proof is None else dict(zip(AXES, proof.improvement.removed.tolist(), strict=True)),
+        mse=None if proof is None else _mean_squares(proof),
         held_out=proof is not None,
         rivals=rivals,
         unresolved_with=unresolved,
@@ -104,6 +105,14 @@ def _force_claim(
         ),
     )
     return Claim(finding, _figures(problem, candidate, values, reported, proof, removed))
+
+
+def _mean_squares(proof: Proof) -> tuple[Mapping[str, float], Mapping[str, float]]:
+    before, after = (
+        dict(zip(AXES, one.tolist(), strict=True))
+        for one in (proof.improvement.mse_before, proof.improvement.mse_after)
+    )
+    return before, after
 
 
 def _figures(

@@ -19,7 +19,7 @@ from ferryid.diagnose.inference.force_errors import force_errors
 from ferryid.diagnose.inference.spectra import Band, bands_of
 from ferryid.diagnose.judging.error_profiles import Profiled, in_words, profiles_of
 from ferryid.diagnose.judging.thresholds import JUDGING
-from ferryid.effects.force_model import Measurements
+from ferryid.effects.force_model import ForceModel, Measurements
 from ferryid.types import Floats, Ints
 
 
@@ -73,10 +73,20 @@ def locate(problem: EstimationProblem, before: Fit, after: Fit, measurements: Me
     measurements
         The log's measurements at its full rate, for frequencies above those of the trial's windows; the trial's own where None.
     """
-    force_models = [fitted_force_model(problem.plain, made) for made in (before, after)]
+    first, second = (fitted_force_model(problem.plain, made) for made in (before, after))
+    return locate_between(problem, (first, second), measurements, unexplained=before is after)
+
+
+def locate_between(
+    problem: EstimationProblem,
+    force_models: tuple[ForceModel, ForceModel],
+    measurements: Measurements | None = None,
+    *,
+    unexplained: bool = False,
+) -> Location:
+    """Return the same of two force models; of one, where its errors are larger than elsewhere, where `unexplained`."""
     first, second = (force_errors(problem.windows, force_model, problem.plain) for force_model in force_models)
     kept, (white, calm) = whitened((first, second), problem.windows.runs)
-    unexplained = before is after
     power_before, power_after = np.mean(white**2, axis=0), np.mean(calm**2, axis=0)
     excess = np.maximum(power_before / power_after - 1.0, 0.0)
     profiles = profiles_of(problem.windows, kept, white, calm, first)
