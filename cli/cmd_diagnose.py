@@ -34,6 +34,10 @@ def command(
             help="Logs to compare the others with, one or several: in which properties and loads they differ."
         ),
     ] = None,
+    reference: Annotated[
+        list[str] | None,
+        typer.Option(help="Another recording of the vessel that brings its hull, without a diagnosis; repeatable."),
+    ] = None,
     withhold: Annotated[
         list[str] | None, typer.Option(help="A signal to hide, such as wind, and to compare afterwards; repeatable.")
     ] = None,
@@ -53,7 +57,7 @@ def command(
     from ferryid import api
     from ferryid.diagnose import DiagnosisSettings
 
-    settings = DiagnosisSettings(None, against, each and not together, tuple(withhold or ()))
+    settings = DiagnosisSettings(None, against, each and not together, tuple(withhold or ()), tuple(reference or ()))
     words = ("ferryid", *sys.argv[1:])
     if versus:
         outcome = api.compare_groups(

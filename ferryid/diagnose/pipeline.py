@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
+from pathlib import Path, PurePath
 
-from ferryid.diagnose.checks.screening import screen_sensors
-from ferryid.diagnose.data.measurements import measure_log
+from ferryid.diagnose.gathering import Gathered, Group, gather, part, without_logs
 from ferryid.diagnose.inference.baselines import CampaignBaseline, HullBaseline, SimulationBaseline
 from ferryid.diagnose.inference.campaign import assemble
 from ferryid.diagnose.inference.simulation_baseline import learn_simulation
-from ferryid.diagnose.inference.stages import AveragedLog, Baseline, average, estimate, select
+from ferryid.diagnose.inference.stages import Baseline, estimate, select
 from ferryid.diagnose.judging.campaign import JudgedCampaign, judge_campaign
 from ferryid.diagnose.judging.conclude import conclude
-from ferryid.diagnose.judging.diagnosis import Diagnosis
+from ferryid.diagnose.judging.diagnosis import Diagnosis, distinguished
 from ferryid.diagnose.judging.judge import judge
 from ferryid.diagnose.judging.learning import Learner, without_withheld
 from ferryid.diagnose.judging.model_update import store_updated_model
 from ferryid.diagnose.second_sources import compare_second_sources
+from ferryid.effects.wording import listed
 from ferryid.errors import FerryIdError
 from ferryid.models import Model
 from ferryid.models.store import check_name
@@ -40,18 +40,26 @@ class DiagnosisSettings:
         Diagnose every log by itself; else several logs are one campaign, with one hull, and conditions judged over all logs.
     withhold
         Signals to hide from the diagnosis.
+    reference
+        Further recordings of the vessel, which bring its hull and have no diagnosis of their own.
     """
 
     model: Model | None = None
     against: str | None = None
     each: bool = False
     withhold: tuple[str, ...] = ()
+    reference: tuple[str, ...] = ()
 
     def check(self) -> None:
         """Refuse two things to compare with at once."""
         if self.against is not None and self.model is not None:
             raise FerryIdError(
                 "diagnose: a recording is compared with one thing at a time, found both --model and --against. "
+                "Fix: leave out one of the two"
+            )
+        if self.against is not None and self.reference:
+            raise FerryIdError(
+                "diagnose: a simulation brings a hull of its own, found both --against and --reference. "
                 "Fix: leave out one of the two"
             )
 
@@ -80,42 +88,73 @@ def diagnose_campaign(
     FerryIdError
         Where no log can be used. Of several, those that cannot are left out, and the notes name them.
     """
-    averaged, left_out = average_logs(logs, profile, settings, run)
-    baseline, together = _baseline(averaged, profile, settings, run)
-    estimated = [estimate(log, baseline) for log in averaged if log.long_enough]
-    selected = [select(log, run.progress) for log in estimated]
-    judged = judge(selected, run.progress)
-    found = conclude(averaged, judged, baseline, together, left_out)
-    sources = compare_second_sources([log.screened.measured for log in averaged], settings.withhold, run.progress)
-    return tuple(replace(one, sources=sources) for one in found)
+    return _diagnosed(
+        _groups(logs, _references(logs, profile, settings, run), profile, settings, run), profile, settings, run
+    )
 
 
-def average_logs(
-    logs: Sequence[str], profile: Profile, settings: DiagnosisSettings, run: RunContext
-) -> tuple[list[AveragedLog], tuple[str, ...]]:
-    """Return the logs that can be used, measured, screened and averaged, and why each of the others cannot."""
-    found, errors = list[AveragedLog](), list[FerryIdError]()
-    for log in logs:
-        try:
-            measured = measure_log(log, profile, run, withhold=settings.withhold)
-            found.append(average(screen_sensors(measured, run.progress)))
-        except FerryIdError as error:
-            # A path that leads nowhere is a slip of the pen, no log that cannot be used.
-            if not (Path(log).exists() or all(Path(part).exists() for part in log.split("+"))):
-                raise
-            errors.append(error)
-    if not found:
-        raise errors[0]
-    return found, tuple(f"Left out of the campaign: {error}" for error in errors)
+def _references(logs: Sequence[str], profile: Profile, settings: DiagnosisSettings, run: RunContext) -> Gathered:
+    """Return the recordings that bring the hull; read once, for all logs."""
+    if not settings.reference:
+        return Gathered(())
+    own = {Path(part).resolve() for log in logs for part in (log, *log.split("+"))}
+    for one in settings.reference:
+        if Path(one).resolve() in own:
+            raise FerryIdError(
+                f"--reference: {one}: it is one of the logs to be diagnosed. Fix: give it as a log or as a reference"
+            )
+    return gather(settings.reference, profile, run, references=True)
+
+
+def _groups(
+    logs: Sequence[str], references: Gathered, profile: Profile, settings: DiagnosisSettings, run: RunContext
+) -> tuple[Group, ...]:
+    """Return the logs that can be used, in groups of one hull each."""
+    gathered = gather(logs, profile, run, withhold=settings.withhold)
+    if settings.against is not None:
+        return (Group(gathered.logs, notes=gathered.notes),)
+    if references.logs:
+        references = without_logs(references, gathered.logs)
+    run.progress("comparing the hulls of the logs")
+    return part(gathered, references, profile, settings.model)
+
+
+def _diagnosed(
+    groups: Sequence[Group], profile: Profile, settings: DiagnosisSettings, run: RunContext
+) -> tuple[Diagnosis, ...]:
+    """Return the diagnoses of all groups; that of the latest, which a model is stored of, last."""
+    found = list[Diagnosis]()
+    for k, group in enumerate(groups):
+        baseline, together = _baseline(group, profile, settings, run)
+        estimated = [estimate(log, baseline) for log in group.logs if log.long_enough]
+        selected = [select(log, run.progress) for log in estimated]
+        judged = judge(selected, run.progress)
+        made = conclude(group.logs, judged, baseline, together, (*group.notes, *_brought(group, together)))
+        sources = compare_second_sources([log.screened.measured for log in group.logs], settings.withhold, run.progress)
+        found += [replace(one, latest=k == len(groups) - 1, sources=sources) for one in made]
+    return tuple(found)
+
+
+def _brought(group: Group, together: JudgedCampaign | None) -> tuple[str, ...]:
+    """Return what the references of a group are for, as a sentence."""
+    if not group.references:
+        return ()
+    names = listed([PurePath(one.path).name for one in group.references])
+    if together is None:
+        return (f"The references {names} do not bring the hull: they are too short. Fix: give longer ones, or more",)
+    return (
+        f"References: {names}. They take part in the estimate of the hull, of properties and of the spread of conditions, and "
+        "have no diagnosis of their own.",
+    )
 
 
 def _baseline(
-    logs: Sequence[AveragedLog], profile: Profile, settings: DiagnosisSettings, run: RunContext
+    group: Group, profile: Profile, settings: DiagnosisSettings, run: RunContext
 ) -> tuple[Baseline, JudgedCampaign | None]:
     """Return what logs are compared with, and what the logs of a campaign say together."""
     if settings.against is not None:
         return SimulationBaseline(learn_simulation(settings.against, profile, run)), None
-    assembled = assemble(logs, profile, settings.model)
+    assembled = assemble([*group.logs, *group.references], profile, settings.model)
     if assembled is None:
         return HullBaseline(profile, settings.model), None
     together = judge_campaign(*assembled, run.progress)
@@ -143,11 +182,15 @@ def diagnose(
         For input that cannot be used.
     """
     settings.check()
-    apart = settings.each or settings.against is not None
-    return tuple(
-        diagnosis
-        for campaign in ([[log] for log in logs] if apart else [logs])
-        for diagnosis in diagnose_campaign(campaign, profile, settings, run)
+    if not settings.each and settings.against is None:
+        return distinguished(diagnose_campaign(logs, profile, settings, run))
+    references = _references(logs, profile, settings, run)
+    return distinguished(
+        [
+            replace(diagnosis, latest=True)
+            for log in logs
+            for diagnosis in _diagnosed(_groups([log], references, profile, settings, run), profile, settings, run)
+        ]
     )
 
 
@@ -182,5 +225,9 @@ def diagnose_and_store(
     # Of a simulation no model comes.
     if settings.against is None:
         seen = without_withheld(profile, settings.withhold)
-        learner = Learner(tuple(one.path for one in found if not one.copy), seen, settings.model, run)
-    return store_updated_model(found, profile, settings.model, run.out, name=name, learner=learner)
+        paths = tuple(one.path for one in found if one.latest and not one.copy)
+        learner = Learner(paths, seen, settings.model, run)
+    # Two hulls make no model.
+    latest = [one for one in found if one.latest]
+    stored = iter(store_updated_model(latest, profile, settings.model, run.out, name=name, learner=learner))
+    return tuple(next(stored) if one.latest else one for one in found)

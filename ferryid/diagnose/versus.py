@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ferryid.counts import counted
+from ferryid.diagnose.gathering import gather
 from ferryid.diagnose.inference.campaign import assemble, repeated
 from ferryid.diagnose.inference.group_differences import GROUPS, in_groups
 from ferryid.diagnose.inference.stages import AveragedLog
@@ -21,7 +22,7 @@ from ferryid.diagnose.judging.group_differences import (
     summary,
 )
 from ferryid.diagnose.judging.group_loads import LoadDifference
-from ferryid.diagnose.pipeline import DiagnosisSettings, average_logs
+from ferryid.diagnose.pipeline import DiagnosisSettings
 from ferryid.errors import FerryIdError
 from ferryid.types import RunContext
 from ferryid.vessel.profile import Profile
@@ -91,10 +92,10 @@ def compare_groups(
     averaged, notes = list[AveragedLog](), list[str]()
     name_of: dict[str, str] = {}
     for group, paths in zip(GROUPS, (logs, versus), strict=True):
-        found, left_out = average_logs(list(dict.fromkeys(paths)), profile, settings, run)
-        averaged += found
-        notes += [f"Group {group}: {one}" for one in left_out]
-        name_of |= {one.path: group for one in found}
+        found = gather(list(dict.fromkeys(paths)), profile, run, withhold=settings.withhold)
+        averaged += found.logs
+        notes += [f"Group {group}: {one}" for one in found.notes]
+        name_of |= {one.path: group for one in found.logs}
     for path, other in repeated(averaged):
         if name_of[path] != name_of[other]:
             raise FerryIdError(
@@ -128,7 +129,11 @@ def compare_groups(
 
 
 def _check(logs: Sequence[str], versus: Sequence[str], settings: DiagnosisSettings) -> None:
-    for given, option in ((settings.against is not None, "--against"), (settings.each, "--each")):
+    for given, option in (
+        (settings.against is not None, "--against"),
+        (settings.each, "--each"),
+        (bool(settings.reference), "--reference"),
+    ):
         if given:
             raise FerryIdError(
                 f"diagnose: groups are compared as one campaign, found both --versus and {option}. "

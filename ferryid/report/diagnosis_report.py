@@ -144,10 +144,8 @@ def as_json(diagnoses: Sequence[Diagnosis]) -> dict[str, Any]:
         "notes": [],
         "withheld": [],
         **({"second_sources": together.to_json()} if together else {}),
-        **({} if diagnoses[0].learned is None else {"learned": diagnoses[0].learned.to_json()}),
-        **(
-            {} if diagnoses[0].likeness_of_all is None else {"likeness": likeness_as_json(diagnoses[0].likeness_of_all)}
-        ),
+        **next(({"learned": one.learned.to_json()} for one in diagnoses if one.learned is not None), {}),
+        **next(({"likeness": likeness_as_json(one.likeness_of_all)} for one in diagnoses if one.likeness_of_all), {}),
         # What several logs teach is one model.
         "model": next((one.model for one in diagnoses if one.model), None),
         "logs": [{key: value for key, value in one.items() if key != "schema"} for one in logs],

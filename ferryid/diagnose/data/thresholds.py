@@ -38,6 +38,12 @@ class DataThresholds:
         "distance of two paths, in the root mean square, above which they are not of the same manoeuvre",
         "convention: half; effects move a vessel less far off its path",
     )
+    no_noise: float = threshold(
+        2e-3,
+        "of the velocity's standard deviation",
+        "difference between steps of the pose and the integral of the velocity below which a log is a simulator's",
+        "convention: a fifth of what optical tracking on a carriage in a tank leaves on its worst axis",
+    )
 
 
 DATA = DataThresholds()

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from math import isfinite
+from pathlib import PurePath
 from typing import Any
 
 from ferryid.diagnose.data.course import MeasuredCourse
@@ -122,6 +123,8 @@ class Diagnosis:
         What was repaired of the log while it was read, as sentences.
     sources
         What topics that the profile does not map show of the sensors; of a campaign, over all logs.
+    latest
+        False for a log of an earlier hull than the one that a model is stored of, where no common hull fits a campaign.
     """
 
     log: str
@@ -148,6 +151,20 @@ class Diagnosis:
     likeness_of_all: Likeness | None = None
     repairs: tuple[str, ...] = ()
     sources: SecondSources = field(default_factory=SecondSources)
+    latest: bool = True
+
+
+def distinguished(diagnoses: Sequence[Diagnosis]) -> tuple[Diagnosis, ...]:
+    """Return diagnoses whose logs have names of their own: of files of one name, with as many folders as make them differ."""
+    names = [one.log for one in diagnoses]
+    for depth in range(1, max((len(PurePath(one.path).parts) for one in diagnoses), default=0)):
+        alike = {k for k, name in enumerate(names) if any(name == other for j, other in enumerate(names) if j != k)}
+        if not alike:
+            break
+        for k in alike:
+            folders = PurePath(diagnoses[k].path).parts[:-1][-depth:]
+            names[k] = "/".join((*folders, diagnoses[k].log))
+    return tuple(replace(one, log=name) for one, name in zip(diagnoses, names, strict=True))
 
 
 def to_json(diagnosis: Diagnosis) -> dict[str, Any]:

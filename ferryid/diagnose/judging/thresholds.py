@@ -244,6 +244,24 @@ class JudgingThresholds:
     campaign_logs: int = threshold(
         3, "logs", "least size of a campaign in which one log can be the exception", "derived: a majority needs three"
     )
+    split_gain: float = threshold(
+        60.0,
+        "nat",
+        "least held-out log-likelihood of two hulls over one for which a campaign is parted",
+        "tuned on real campaigns of one vessel and 400 parts of them, together with the ratio: the nearest has 72 and 2.2",
+    )
+    split_ratio: float = threshold(
+        2.5,
+        "-",
+        "least held-out squared force error of the smaller part with the common hull over that with its own",
+        "tuned with the gain: to part one vessel is worse than to keep two together",
+    )
+    usual_disagreement: float = threshold(
+        2.0,
+        "-",
+        "variance by which logs of a vessel differ about its hull over that of their noise, where one log alone brings it",
+        "tuned on real campaigns of one vessel, in which it is 1.5 to 2.9, and 4.6 where some logs have unrecorded forces",
+    )
     contradiction_share: float = threshold(
         0.25,
         "of the usual size",

@@ -1,0 +1,236 @@
+"""The logs of a campaign before anything is judged: which can be used, which belong together, and which bring the hull."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ferryid.counts import counted
+from ferryid.diagnose.checks.screening import screen_sensors
+from ferryid.diagnose.data.measurements import measure_log
+from ferryid.diagnose.data.simulated import simulated
+from ferryid.diagnose.inference.campaign import assemble, repeated
+from ferryid.diagnose.inference.stages import AveragedLog, average
+from ferryid.diagnose.judging.campaign_split import Split, find_split
+from ferryid.effects.wording import listed
+from ferryid.errors import FerryIdError
+from ferryid.models import Model
+from ferryid.types import RunContext
+from ferryid.vessel.profile import Profile
+
+CLOCK_SET_NS = 946_684_800_000_000_000
+"""Start of the year 2000: earlier times are no dates, but seconds since a log or a clock began."""
+
+
+@dataclass(frozen=True)
+class Gathered:
+    """Logs that can be used, measured, screened and averaged, and sentences on the others and on all."""
+
+    logs: tuple[AveragedLog, ...]
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Group:
+    """Logs with one hull, the references that bring it too, and what a reader must know of them."""
+
+    logs: tuple[AveragedLog, ...]
+    references: tuple[AveragedLog, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def gather(
+    paths: Sequence[str], profile: Profile, run: RunContext, *, withhold: Sequence[str] = (), references: bool = False
+) -> Gathered:
+    """Return the logs of a campaign that can be used, and why each of the others cannot.
+
+    Parameters
+    ----------
+    paths
+        Logs; parts of one recording joined by ``+``.
+    profile, run
+        The vessel; folder of the ingested tables and progress.
+    withhold
+        Signals to hide.
+    references
+        True where they only bring the hull; the sentences then name them so.
+
+    Raises
+    ------
+    FerryIdError
+        Where none can be used, and for a path that leads nowhere.
+    """
+    found, errors = list[AveragedLog](), list[FerryIdError]()
+    for path in paths:
+        try:
+            measured = measure_log(path, profile, run, withhold=withhold)
+            found.append(average(screen_sensors(measured, run.progress)))
+        except FerryIdError as error:
+            # A path that leads nowhere is a slip of the pen, no log that cannot be used.
+            if not (Path(path).exists() or all(Path(part).exists() for part in path.split("+"))):
+                raise
+            errors.append(error)
+    if not found:
+        raise errors[0]
+    artificial = {one.path: why for one in found if (why := simulated(one.screened.measured))}
+    whose = "references" if references else "campaign"
+    notes = [f"Left out of the {whose}: {error}" for error in errors]
+    if 0 < len(artificial) < len(found):
+        found = [one for one in found if one.path not in artificial]
+        notes += [
+            f"Left out of the {whose}: {path}: it is simulated among recorded logs, {why}. Fix: diagnose simulated logs by "
+            "themselves"
+            for path, why in artificial.items()
+        ]
+    return Gathered(tuple(found), (*notes, *_clocks(found)))
+
+
+def _clocks(logs: Sequence[AveragedLog]) -> tuple[str, ...]:
+    """Return a sentence on logs of one campaign whose times overlap, as a vessel cannot make two at once."""
+    copies = {path for path, _ in repeated(logs)}
+    spans = sorted(
+        (start, start + round(_seconds(one) * 1e9), one.path)
+        for one in logs
+        if one.path not in copies and (start := _start_ns(one)) >= CLOCK_SET_NS
+    )
+    overlapping = []
+    for k, (_, end, path) in enumerate(spans):
+        for start, other_end, other in spans[k + 1 :]:
+            if start < end and path != other:
+                seconds = (min(end, other_end) - start) * 1e-9
+                overlapping.append(f"{Path(path).name} and {Path(other).name} by {seconds:.0f} s")
+    if not overlapping:
+        return ()
+    return (
+        f"The times of logs overlap, as if a clock was set back between them: {listed(overlapping)}. Each log is used with its "
+        "own times; which is the earlier one is not known.",
+    )
+
+
+def without_logs(references: Gathered, logs: Sequence[AveragedLog]) -> Gathered:
+    """Return references without those that hold the motion of a log that is diagnosed, and without simulated ones of a vessel.
+
+    Raises
+    ------
+    FerryIdError
+        Where none is left.
+    """
+    again = dict(repeated([*logs, *references.logs]))
+    real = not all(simulated(one.screened.measured) for one in logs)
+    wrong = {one.path: f"it holds the motion of {again[one.path]}" for one in references.logs if one.path in again}
+    for one in references.logs:
+        if real and (why := simulated(one.screened.measured)):
+            wrong.setdefault(one.path, f"it is simulated and the logs are recorded, {why}")
+    kept = tuple(one for one in references.logs if one.path not in wrong)
+    if not kept:
+        path = references.logs[0].path
+        raise FerryIdError(f"--reference: {path}: {wrong[path]}. Fix: give other recordings of the vessel")
+    notes = tuple(f"Left out of the references: {path}: {why}." for path, why in wrong.items())
+    return Gathered(kept, (*references.notes, *notes))
+
+
+def part(gathered: Gathered, references: Gathered, profile: Profile, model: Model | None) -> tuple[Group, ...]:
+    """Return the logs in groups of one hull each, the latest last; one group where a common hull fits all."""
+    whole = Group(gathered.logs, references.logs, (*gathered.notes, *references.notes))
+    open_groups, closed = [whole], list[Group]()
+    while open_groups:
+        group = open_groups.pop()
+        parts = _parted(group, profile, model)
+        if len(parts) == 1 and parts[0] is group:
+            closed.append(group)
+        else:
+            open_groups += parts
+    order = [id(one) for one in _in_time(gathered.logs)]
+    return tuple(sorted(closed, key=lambda group: max(order.index(id(one)) for one in group.logs)))
+
+
+def _in_time(logs: Sequence[AveragedLog]) -> list[AveragedLog]:
+    """Return logs in order of time; in the order in which they were given where times are no dates."""
+    dated = all(_start_ns(one) >= CLOCK_SET_NS for one in logs)
+    return sorted(logs, key=_start_ns) if dated else list(logs)
+
+
+def _parted(group: Group, profile: Profile, model: Model | None) -> list[Group]:
+    assembled = assemble(_in_time([*group.logs, *group.references]), profile, model)
+    if assembled is None:
+        return [group]
+    campaign, place = assembled
+    own = {one.path for one in group.logs}
+    paths = sorted(place, key=lambda path: place[path])
+    split = find_split(campaign, np.array([path not in own for path in paths]))
+    if split is None:
+        return [group]
+    inside = {path for path, one in zip(paths, split.inside.tolist(), strict=True) if one}
+    outside = set(paths) - inside
+    if not own & inside:
+        return [_without_references(group, inside, split)]
+    if not own & outside:
+        return [_without_references(group, outside, split)]
+    (alone, *more), others = sorted(inside), own & outside
+    if not more and len(others) > 1:
+        return [_left_out(group, alone, split, len(others))]
+    return _halves(group, inside, outside, split)
+
+
+def _why(split: Split) -> str:
+    return (
+        f"no common hull fits (held-out squared force error with it {split.ratio:.1f} times that with hulls of their own, "
+        f"likelihood of held-out stretches {split.gain.total:+.0f} nat)"
+    )
+
+
+def _without_references(group: Group, paths: set[str], split: Split) -> Group:
+    names = listed([Path(one).name for one in sorted(paths)])
+    note = (
+        f"Left out of the references: {names}: {_why(split)}; another vessel, or its hull or load changed. "
+        "Fix: give recordings of the vessel as it is in the logs"
+    )
+    kept = tuple(one for one in group.references if one.path not in paths)
+    return replace(group, references=kept, notes=(*group.notes, note))
+
+
+def _left_out(group: Group, path: str, split: Split, others: int) -> Group:
+    note = (
+        f"Left out of the campaign: {path}: {_why(split)} it and the {counted(others, 'other log')}; another vessel, or its "
+        "hull or load changed. Fix: diagnose it with --each, or with the right profile"
+    )
+    copies = {one for one, other in repeated(group.logs) if other == path} | {path}
+    kept = tuple(one for one in group.logs if one.path not in copies)
+    return replace(group, logs=kept, notes=(*group.notes, note))
+
+
+def _halves(group: Group, inside: set[str], outside: set[str], split: Split) -> list[Group]:
+    """Return a group in two; logs that are too short to take part go with the one that is nearest among the logs."""
+    copies = dict(repeated(group.logs))
+    judged = [k for k, one in enumerate(group.logs) if one.path in inside | outside]
+
+    def within(k: int) -> bool:
+        path = copies.get(group.logs[k].path, group.logs[k].path)
+        if path in inside | outside:
+            return path in inside
+        return group.logs[min(judged, key=lambda other: abs(other - k))].path in inside
+
+    chosen = [within(k) for k in range(len(group.logs))]
+    parts = [tuple(one for one, here in zip(group.logs, chosen, strict=True) if here == side) for side in (True, False)]
+    names = [listed([Path(one.path).name for one in logs]) for logs in parts]
+    note = (
+        f"The campaign is split in two: {_why(split)} {names[0]} on one side and {names[1]} on the other. The hull or the load "
+        "changed between them, or one side is of another vessel. Each side has a hull of its own; a model is stored of the "
+        "later one."
+    )
+    return [
+        Group(logs, tuple(one for one in group.references if one.path in side), (*group.notes, note))
+        for logs, side in zip(parts, (inside, outside), strict=True)
+    ]
+
+
+def _start_ns(log: AveragedLog) -> int:
+    return log.screened.measured.survey.t0_ns
+
+
+def _seconds(log: AveragedLog) -> float:
+    t = log.screened.measurements.t
+    return float(t[-1] - t[0])

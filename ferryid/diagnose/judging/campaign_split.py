@@ -1,0 +1,200 @@
+"""Logs that no common hull fits: one of another vessel among those of a campaign, or a hull that changed between two days.
+
+A campaign is parted where its logs are predicted better by two hulls than by one, on stretches that neither was fitted to. Of
+every log, blocks are held out in turn; the hull comes from other logs, all of them or those of the same part, and from the rest
+of the log itself. Formulas are off in every campaign, so that logs differ about one hull by more than their noise: a hull is as
+uncertain as the logs that it comes from differ among themselves. To part is right only where both the likelihood and the force
+errors of the smaller part are far better with a hull of its own.
+
+Every block is predicted from the normal equations at the common estimate, which is exact where gaps are linear in the hull.
+Parts that are tried are single logs, those before and after a time, and references against the rest; of many the likeliest, by
+how far their hulls are apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ferryid.diagnose.inference.campaign_estimation import CampaignFit, estimate_campaign
+from ferryid.diagnose.inference.campaign_model import Campaign
+from ferryid.diagnose.judging.campaign_evidence import Gain, held_out_blocks, without_conditions
+from ferryid.diagnose.judging.thresholds import JUDGING
+from ferryid.diagnose.parallel import over
+from ferryid.types import Flags, Floats, Ints
+
+WEIGHED = 4
+"""Ways to part a campaign that are judged on held-out data, the likeliest of each kind."""
+
+
+@dataclass(frozen=True)
+class Split:
+    """Two parts of a campaign that no common hull fits.
+
+    Attributes
+    ----------
+    inside
+        Which logs are the smaller part, shape (L,).
+    gain
+        Held-out log-likelihood of two hulls over one.
+    ratio
+        Held-out squared force error of the smaller part with the common hull over that with its own: geometric mean over its
+        logs and the axes.
+    """
+
+    inside: Flags
+    gain: Gain
+    ratio: float
+
+    @property
+    def likelier(self) -> bool:
+        """True where two hulls surely predict held-out stretches better."""
+        return self.gain.total >= JUDGING.split_gain and self.gain.low > 0.0
+
+    @property
+    def found(self) -> bool:
+        """True where they do so by more than logs of one vessel differ."""
+        return self.likelier and self.ratio >= JUDGING.split_ratio
+
+
+def find_split(campaign: Campaign, reference: Flags) -> Split | None:
+    """Return how a campaign falls into two parts that no common hull fits; None where one fits all.
+
+    Parameters
+    ----------
+    campaign
+        Its logs in order of time.
+    reference
+        Which of them are references, shape (L,).
+    """
+    bare = estimate_campaign(without_conditions(campaign))
+    found = [one for one in _judged(bare, _ways(reference)) if one.found]
+    if not found:
+        return None
+    best = max(found, key=lambda one: one.gain.total)
+    if not campaign.conditions:
+        return best
+    # A wind or a current of one log must not look like another hull.
+    (beside,) = _judged(estimate_campaign(campaign), [best.inside])
+    return best if beside.likelier else None
+
+
+def _ways(reference: Flags) -> list[Flags]:
+    """Return the ways to part logs: one against the others, before a time and after it, references against the rest."""
+    count = len(reference)
+    order = np.arange(count)
+    ways = [order == i for i in range(count)]
+    ways += [order < k for k in range(2, count - 1)]
+    if reference.any() and not reference.all():
+        ways.append(reference)
+    # Of two logs it is one way.
+    return list({tuple(min(one, ~one, key=_smaller).tolist()): min(one, ~one, key=_smaller) for one in ways}.values())
+
+
+def _smaller(inside: Flags) -> tuple[int, tuple[bool, ...]]:
+    return int(inside.sum()), tuple((~inside).tolist())
+
+
+def _judged(made: CampaignFit, ways: Sequence[Flags]) -> list[Split]:
+    logs = _Logs(made)
+    kinds = [[one for one in ways if one.sum() == 1], [one for one in ways if one.sum() > 1]]
+    return [logs.split(one) for kind in kinds for one in sorted(kind, key=logs.apart, reverse=True)[:WEIGHED]]
+
+
+@dataclass(frozen=True)
+class _Logs:
+    """The logs of a campaign at the common estimate: what some of them say of the hull, and how it predicts others."""
+
+    made: CampaignFit
+
+    @cached_property
+    def linear(self) -> list[tuple[Floats, Floats]]:
+        """Accelerations left over in every log, and their derivatives."""
+        made = self.made
+
+        def at(i: int) -> tuple[Floats, Floats]:
+            slopes = made.campaign.hull_slopes(i, made.common, made.own[i])
+            return made.campaign.linearised(i, made.common, made.own[i], slopes)
+
+        return over(at, range(len(made.parts)))
+
+    def apart(self, inside: Flags) -> float:
+        """Return how far the hulls of two parts are apart, by how uncertain they are: squared, over its expectation."""
+        (A, first), (B, second) = (self._belief(np.flatnonzero(one)) for one in (inside, ~inside))
+        away = np.linalg.solve(A, first) - np.linalg.solve(B, second)
+        covariance = np.linalg.inv(A) + np.linalg.inv(B)
+        # Directions of which a part knows nothing differ by nothing but the prior.
+        known = float(np.trace(np.eye(len(A)) - 0.5 * covariance))
+        return float(away @ np.linalg.solve(covariance, away)) / max(known, 1.0)
+
+    def split(self, inside: Flags) -> Split:
+        """Judge one way to part the logs, by held-out blocks."""
+        every = np.arange(len(inside))
+        parts = [every[inside], every[~inside]]
+        # One hull is not believed more firmly than two are: the logs differ between the parts by what is to be judged.
+        factor = max(self.disagreement(one) if len(one) > 1 else 1.0 for one in parts)
+
+        def judged(i: int) -> tuple[Floats, Floats]:
+            own = parts[0] if inside[i] else parts[1]
+            one = self._held_out(i, every[every != i], factor)
+            two = self._held_out(i, own[own != i], self.disagreement(own[own != i]))
+            errors = [np.mean(errors**2, axis=0) for _, errors in (one, two)]
+            return _gains(one[0], two[0], self.made.parts[i].gaps.size), np.log(errors[0] / errors[1])
+
+        found = over(judged, every.tolist())
+        ratio = float(np.exp(np.mean([one for i, (_, one) in enumerate(found) if inside[i]])))
+        return Split(inside, Gain.of(np.concatenate([gains for gains, _ in found])), ratio)
+
+    def disagreement(self, which: Ints) -> float:
+        """Return the variance by which some logs differ about their own common hull over that of their noise, at least 1."""
+        if len(which) < 2:
+            # One log cannot say: as much as logs of one vessel differ.
+            return JUDGING.usual_disagreement
+        A, slope = self._belief(which)
+        away = np.linalg.solve(A, slope)
+        apart, expected, one = 0.0, 0.0, np.eye(len(A))
+        for H, b in zip(self.made.normal.matrices[which], self.made.normal.slopes[which], strict=True):
+            inverse, gradient = np.linalg.inv(H + one), b + H @ away
+            apart += float(gradient @ inverse @ gradient)
+            expected += float(np.trace(H @ inverse))
+        return max(1.0, apart / max(expected * (1.0 - 1.0 / len(which)), 1e-12))
+
+    def _belief(self, which: Ints, factor: float = 1.0) -> tuple[Floats, Floats]:
+        """Return what some logs say of the step from the common estimate: its precision, and that times its mean."""
+        normal, common = self.made.normal, self.made.common
+        H, b = normal.matrices[which].sum(axis=0) / factor, normal.slopes[which].sum(axis=0) / factor
+        return np.eye(len(common)) + H, -(common + b)
+
+    def _held_out(self, i: int, others: Ints, factor: float) -> tuple[Floats, Floats]:
+        """Return the squares of a log's held-out blocks, whitened, and its errors, if others bring the hull."""
+        made, part = self.made, self.made.parts[i]
+        P, b = self._belief(others, factor)
+        precision = made.campaign.own_precision(made.spreads)
+        g, width = len(b), part.slopes.shape[2]
+        J, w = part.slopes.reshape(-1, width), part.gaps.ravel()
+        N = J.T @ J
+        N[:g, :g] += P
+        N[g:, g:] += np.diag(precision)
+        right = np.concatenate([b, -precision * made.own[i]]) - J.T @ w
+        errors, slopes = self.linear[i]
+        errors, squares = errors.copy(), []
+        for block, near in held_out_blocks(made.campaign.members[i].windows):
+            K, v = part.slopes[near].reshape(-1, width), part.gaps[near].ravel()
+            step = np.linalg.solve(N - K.T @ K, right + K.T @ v)
+            squares.append(float(np.sum((part.gaps[block] + part.slopes[block] @ step) ** 2)))
+            errors[block] += slopes[block] @ step
+        return np.array(squares), errors
+
+
+def _gains(one: Floats, two: Floats, count: int) -> Floats:
+    """Return the log-likelihood that each block of a log gains, from its squares under one hull and under two.
+
+    How loud the noise of the log is follows from each: where its hull is wrong, the common estimate has called it noise.
+    """
+    first, second = float(one.sum()), float(two.sum())
+    apart = first - second
+    mean = second if abs(apart) < 1e-9 * second else apart / np.log(first / second)
+    return np.asarray(0.5 * count * (one - two) / mean)
