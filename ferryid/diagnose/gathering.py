@@ -23,6 +23,8 @@ from ferryid.vessel.profile import Profile
 
 CLOCK_SET_NS = 946_684_800_000_000_000
 """Start of the year 2000: earlier times are no dates, but seconds since a log or a clock began."""
+SHOWN_OVERLAPS = 3
+"""Pairs of overlapping logs that are listed; the others are counted."""
 
 
 @dataclass(frozen=True)
@@ -104,9 +106,11 @@ def _clocks(logs: Sequence[AveragedLog]) -> tuple[str, ...]:
                 overlapping.append(f"{Path(path).name} and {Path(other).name} by {seconds:.0f} s")
     if not overlapping:
         return ()
+    more = len(overlapping) - SHOWN_OVERLAPS
+    shown = [*overlapping[:SHOWN_OVERLAPS], *([f"{counted(more, 'more pair')}"] if more > 0 else [])]
     return (
-        f"The times of logs overlap, as if a clock was set back between them: {listed(overlapping)}. Each log is used with its "
-        "own times; which is the earlier one is not known.",
+        f"The times of logs overlap, as if a clock was set back between them: {listed(shown)}. Each log is used with its own "
+        "times; which is the earlier one is not known.",
     )
 
 

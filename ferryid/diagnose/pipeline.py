@@ -88,9 +88,9 @@ def diagnose_campaign(
     FerryIdError
         Where no log can be used. Of several, those that cannot are left out, and the notes name them.
     """
-    return _diagnosed(
-        _groups(logs, _references(logs, profile, settings, run), profile, settings, run), profile, settings, run
-    )
+    groups = _groups(logs, _references(logs, profile, settings, run), profile, settings, run)
+    found = _diagnosed(groups, profile, settings, run)
+    return tuple(sorted(found, key=lambda one: list(logs).index(one.path)))
 
 
 def _references(logs: Sequence[str], profile: Profile, settings: DiagnosisSettings, run: RunContext) -> Gathered:

@@ -41,8 +41,8 @@ class Split:
     gain
         Held-out log-likelihood of two hulls over one.
     ratio
-        Held-out squared force error of the smaller part with the common hull over that with its own: geometric mean over its
-        logs and the axes.
+        Held-out squared force error with the common hull over that with the part's own: geometric mean over logs and axes of a
+        part, the greater of the two.
     """
 
     inside: Flags
@@ -51,13 +51,13 @@ class Split:
 
     @property
     def likelier(self) -> bool:
-        """True where two hulls surely predict held-out stretches better."""
-        return self.gain.total >= JUDGING.split_gain and self.gain.low > 0.0
+        """True where two hulls predict held-out stretches far better."""
+        return self.gain.total >= JUDGING.split_gain
 
     @property
     def found(self) -> bool:
-        """True where they do so by more than logs of one vessel differ."""
-        return self.likelier and self.ratio >= JUDGING.split_ratio
+        """True where they surely do, and by more than logs of one vessel differ."""
+        return self.likelier and self.gain.low > 0.0 and self.ratio >= JUDGING.split_ratio
 
 
 def find_split(campaign: Campaign, reference: Flags) -> Split | None:
@@ -145,7 +145,8 @@ class _Logs:
             return _gains(one[0], two[0], self.made.parts[i].gaps.size), np.log(errors[0] / errors[1])
 
         found = over(judged, every.tolist())
-        ratio = float(np.exp(np.mean([one for i, (_, one) in enumerate(found) if inside[i]])))
+        ratios = np.stack([one for _, one in found])
+        ratio = max(float(np.exp(np.mean(ratios[one]))) for one in (inside, ~inside))
         return Split(inside, Gain.of(np.concatenate([gains for gains, _ in found])), ratio)
 
     def disagreement(self, which: Ints) -> float:

@@ -156,9 +156,14 @@ class Diagnosis:
 
 def distinguished(diagnoses: Sequence[Diagnosis]) -> tuple[Diagnosis, ...]:
     """Return diagnoses whose logs have names of their own: of files of one name, with as many folders as make them differ."""
-    names = [one.log for one in diagnoses]
-    for depth in range(1, max((len(PurePath(one.path).parts) for one in diagnoses), default=0)):
-        alike = {k for k, name in enumerate(names) if any(name == other for j, other in enumerate(names) if j != k)}
+    names, paths = [one.log for one in diagnoses], [one.path for one in diagnoses]
+    for depth in range(1, max((len(PurePath(one).parts) for one in paths), default=0)):
+        others = set(zip(names, paths, strict=True))
+        alike = {
+            k
+            for k, (name, path) in enumerate(zip(names, paths, strict=True))
+            if any(name == other and path != where for other, where in others)
+        }
         if not alike:
             break
         for k in alike:

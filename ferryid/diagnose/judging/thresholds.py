@@ -253,7 +253,7 @@ class JudgingThresholds:
     split_ratio: float = threshold(
         2.5,
         "-",
-        "least held-out squared force error of the smaller part with the common hull over that with its own",
+        "least held-out squared force error of a part with the common hull over that with its own",
         "tuned with the gain: to part one vessel is worse than to keep two together",
     )
     usual_disagreement: float = threshold(
