@@ -11,7 +11,7 @@ from ferryid.cli.options import OUT, Json, Logs, MaybeVessel, Out, Verify
 from ferryid.cli.output import emit, progress
 from ferryid.cli.several import several_after
 
-Command = several_after("--versus")
+Command = several_after("--versus", "--reference")
 
 
 def command(
@@ -36,7 +36,7 @@ def command(
     ] = None,
     reference: Annotated[
         list[str] | None,
-        typer.Option(help="Another recording of the vessel that brings its hull, without a diagnosis; repeatable."),
+        typer.Option(help="Other recordings of the vessel, one or several, that bring its hull and get no diagnosis."),
     ] = None,
     withhold: Annotated[
         list[str] | None, typer.Option(help="A signal to hide, such as wind, and to compare afterwards; repeatable.")

@@ -9,21 +9,22 @@ from typer.core import TyperCommand
 from ferryid.errors import FerryIdError
 
 
-def several_after(option: str) -> type[TyperCommand]:
-    """Return a command that takes several words after one option, as ``--on a.bag b.bag``."""
+def several_after(*options: str) -> type[TyperCommand]:
+    """Return a command that takes several words after some options, as ``--on a.bag b.bag``."""
 
     class Command(TyperCommand):
         def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-            """Repeat the option before every word that follows it, up to the next option."""
+            """Repeat such an option before every word that follows it, up to the next option."""
             written: list[str] = []
-            follows = False
+            follows = ""
             for place, word in enumerate(args):
-                if word == option and (args[place + 1 : place + 2] or ["-"])[0].startswith("-"):
-                    raise FerryIdError(f"{option}: no log follows it. Fix: name one or more after it")
+                if word in options and (args[place + 1 : place + 2] or ["-"])[0].startswith("-"):
+                    raise FerryIdError(f"{word}: no log follows it. Fix: name one or more after it")
                 if word.startswith("-"):
-                    follows = word.partition("=")[0] == option
-                elif follows and written[-1] != option:
-                    written.append(option)
+                    option = word.partition("=")[0]
+                    follows = option if option in options else ""
+                elif follows and written[-1] != follows:
+                    written.append(follows)
                 written.append(word)
             return super().parse_args(ctx, written)
 
