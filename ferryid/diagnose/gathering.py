@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,6 +15,7 @@ from ferryid.diagnose.data.simulated import simulated
 from ferryid.diagnose.inference.campaign import assemble, repeated
 from ferryid.diagnose.inference.stages import AveragedLog, average
 from ferryid.diagnose.judging.campaign_split import Split, find_split
+from ferryid.diagnose.judging.diagnosis import distinct
 from ferryid.effects.wording import listed
 from ferryid.errors import FerryIdError
 from ferryid.models import Model
@@ -65,7 +66,7 @@ def gather(
     FerryIdError
         Where none can be used, and for a path that leads nowhere.
     """
-    found, errors = list[AveragedLog](), list[FerryIdError]()
+    found, errors = list[AveragedLog](), dict[str, FerryIdError]()
     for path in paths:
         try:
             measured = measure_log(path, profile, run, withhold=withhold)
@@ -74,12 +75,16 @@ def gather(
             # A path that leads nowhere is a slip of the pen, no log that cannot be used.
             if not (Path(path).exists() or all(Path(part).exists() for part in path.split("+"))):
                 raise
-            errors.append(error)
+            errors[path] = error
     if not found:
-        raise errors[0]
+        raise next(iter(errors.values()))
     artificial = {one.path: why for one in found if (why := simulated(one.screened.measured))}
     whose = "references" if references else "campaign"
-    notes = [f"Left out of the {whose}: {error}" for error in errors]
+    # A contradiction is between a log and its profile, and may be the profile's fault.
+    notes = [
+        f"Left out of the {whose}: {error if Path(path).stem in str(error) else f'{path}: {error}'}"
+        for path, error in errors.items()
+    ]
     if 0 < len(artificial) < len(found):
         found = [one for one in found if one.path not in artificial]
         notes += [
@@ -181,16 +186,21 @@ def _parted(group: Group, profile: Profile, model: Model | None) -> list[Group]:
 
 def _why(split: Split) -> str:
     return (
-        f"no common hull fits (held-out squared force error with it {split.ratio:.1f} times that with hulls of their own, "
-        f"likelihood of held-out stretches {split.gain.total:+.0f} nat)"
+        f"held-out squared force error with one hull {split.ratio:.1f} times that with hulls of their own, likelihood of "
+        f"held-out stretches {split.gain.total:+.0f} nat with these"
     )
 
 
+def _names(group: Group, paths: Collection[str]) -> str:
+    every = [one.path for one in (*group.logs, *group.references)]
+    names = distinct([Path(one).name for one in every], every)
+    return listed([name for name, path in zip(names, every, strict=True) if path in paths])
+
+
 def _without_references(group: Group, paths: set[str], split: Split) -> Group:
-    names = listed([Path(one).name for one in sorted(paths)])
     note = (
-        f"Left out of the references: {names}: {_why(split)}; another vessel, or its hull or load changed. "
-        "Fix: give recordings of the vessel as it is in the logs"
+        f"Left out of the references: {_names(group, paths)}: no common hull fits the logs and them ({_why(split)}); another "
+        "vessel, or its hull or load changed. Fix: give recordings of the vessel as it is in the logs"
     )
     kept = tuple(one for one in group.references if one.path not in paths)
     return replace(group, references=kept, notes=(*group.notes, note))
@@ -198,8 +208,8 @@ def _without_references(group: Group, paths: set[str], split: Split) -> Group:
 
 def _left_out(group: Group, path: str, split: Split, others: int) -> Group:
     note = (
-        f"Left out of the campaign: {path}: {_why(split)} it and the {counted(others, 'other log')}; another vessel, or its "
-        "hull or load changed. Fix: diagnose it with --each, or with the right profile"
+        f"Left out of the campaign: {path}: no common hull fits it and the {counted(others, 'other log')} ({_why(split)}); "
+        "another vessel, or its hull or load changed. Fix: diagnose it with --each, or with the right profile"
     )
     copies = {one for one, other in repeated(group.logs) if other == path} | {path}
     kept = tuple(one for one in group.logs if one.path not in copies)
@@ -219,11 +229,11 @@ def _halves(group: Group, inside: set[str], outside: set[str], split: Split) -> 
 
     chosen = [within(k) for k in range(len(group.logs))]
     parts = [tuple(one for one, here in zip(group.logs, chosen, strict=True) if here == side) for side in (True, False)]
-    names = [listed([Path(one.path).name for one in logs]) for logs in parts]
+    first, second = (_names(group, {one.path for one in logs}) for logs in parts)
     note = (
-        f"The campaign is split in two: {_why(split)} {names[0]} on one side and {names[1]} on the other. The hull or the load "
-        "changed between them, or one side is of another vessel. Each side has a hull of its own; a model is stored of the "
-        "later one."
+        f"The campaign is split in two: no common hull fits {first} on one side and {second} on the other ({_why(split)}). The "
+        "hull or the load changed between them, or one side is of another vessel. Each side has a hull of its own; a model is "
+        "stored of the later one."
     )
     return [
         Group(logs, tuple(one for one in group.references if one.path in side), (*group.notes, note))

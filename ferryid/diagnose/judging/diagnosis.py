@@ -155,21 +155,24 @@ class Diagnosis:
 
 
 def distinguished(diagnoses: Sequence[Diagnosis]) -> tuple[Diagnosis, ...]:
-    """Return diagnoses whose logs have names of their own: of files of one name, with as many folders as make them differ."""
-    names, paths = [one.log for one in diagnoses], [one.path for one in diagnoses]
-    for depth in range(1, max((len(PurePath(one).parts) for one in paths), default=0)):
-        others = set(zip(names, paths, strict=True))
-        alike = {
-            k
-            for k, (name, path) in enumerate(zip(names, paths, strict=True))
-            if any(name == other and path != where for other, where in others)
-        }
-        if not alike:
-            break
-        for k in alike:
-            folders = PurePath(diagnoses[k].path).parts[:-1][-depth:]
-            names[k] = "/".join((*folders, diagnoses[k].log))
+    """Return diagnoses whose logs have names of their own."""
+    names = distinct([one.log for one in diagnoses], [one.path for one in diagnoses])
     return tuple(replace(one, log=name) for one, name in zip(diagnoses, names, strict=True))
+
+
+def distinct(names: Sequence[str], paths: Sequence[str]) -> list[str]:
+    """Return names of files; of those that are alike, with as many folders before them as make them differ."""
+    made = list(names)
+    for depth in range(1, max((len(PurePath(one).parts) for one in paths), default=0)):
+        others = set(zip(made, paths, strict=True))
+        alike = [
+            k
+            for k, (name, path) in enumerate(zip(made, paths, strict=True))
+            if any(name == other and path != where for other, where in others)
+        ]
+        for k in alike:
+            made[k] = "/".join((*PurePath(paths[k]).parts[:-1][-depth:], names[k]))
+    return made
 
 
 def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
