@@ -12,7 +12,7 @@ from ferryid.counts import counted
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit
 from ferryid.diagnose.inference.campaign_model import INDUCED, Campaign, HullPrior, Member, induced, induced_spread
 from ferryid.diagnose.inference.estimation import Candidate
-from ferryid.diagnose.inference.prior import prior_force_model
+from ferryid.diagnose.inference.prior import correlation_root, prior_force_model
 from ferryid.diagnose.inference.stages import AveragedLog
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
@@ -95,7 +95,9 @@ def assemble(
     known = model is not None or profile.hull.has_model
     size = np.zeros(len(INDUCED)) if known else induced_spread(length, draught)
     mean = np.concatenate([members[0].plain.hull, np.zeros(len(INDUCED))])
-    return Campaign(tuple(members), HullPrior(mean, np.append(np.max(spreads, axis=0), size), known)), place
+    spread = np.append(np.max(spreads, axis=0), size)
+    prior = HullPrior(mean, spread, known, None if model is None else correlation_root(model, spread))
+    return Campaign(tuple(members), prior), place
 
 
 def repeated(logs: Sequence[AveragedLog]) -> list[tuple[str, str]]:

@@ -136,8 +136,8 @@ class CampaignFit:
             z = z + np.linalg.solve(A, self.normal.slopes[without])
         # Logs that differ by more than noise know less of the hull than their noise says, but never less than before.
         known = prior + (A - prior) / max(1.0, self.disagreement)
-        spread = self.campaign.hull.spread
-        return self.campaign.hull.mean + spread * z[:h], np.linalg.inv(known)[:h, :h] * np.outer(spread, spread)
+        root = self.campaign.hull.root
+        return self.campaign.hull.mean + root @ z[:h], root @ np.linalg.inv(known)[:h, :h] @ root.T
 
     def condition(self, i: int, k: int) -> tuple[Floats, Floats]:
         """Return what a log has of a condition, in its unit, and the covariance that is reported of it, shapes (q,) and (q, q).

@@ -42,17 +42,25 @@ class Member:
 class HullPrior:
     """What is believed of the hull before any log: `COEFFICIENTS` and `INDUCED`, mean and standard deviations, shape (h,).
 
-    `known` is False where nobody has modelled it, so that it comes from the logs alone.
+    `known` is False where nobody has modelled it, so that it comes from the logs alone; `together` is the root of their
+    correlation matrix, shape (h, h), where a fitted model brings it, and they are independent where None.
     """
 
     mean: Floats
     spread: Floats
     known: bool = True
+    together: Floats | None = None
 
     @cached_property
     def free(self) -> Ints:
         """Which of them can move."""
         return np.flatnonzero(self.spread)
+
+    @cached_property
+    def root(self) -> Floats:
+        """What turns the vector that is estimated, of unit variance, into departures from the mean, shape (h, h)."""
+        root = np.eye(len(self.spread)) if self.together is None else self.together
+        return np.asarray(self.spread[:, None] * root)
 
 
 @dataclass(frozen=True)
@@ -139,7 +147,7 @@ class Campaign:
     def force_model(self, i: int, common: Floats, own: Floats) -> ForceModel:
         """Return a log's force model at an estimate, without its steady acceleration."""
         member, n = self.members[i], len(COEFFICIENTS)
-        hull = self.hull.mean + self.hull.spread * common[: len(self.hull.mean)]
+        hull = self.hull.mean + self.hull.root @ common[: len(self.hull.mean)]
         modelled = induced(replace(member.plain, hull=hull[:n]), hull[n:])
         return self.acted(modelled, member.conditions, common, own, member.group)
 
@@ -172,7 +180,7 @@ class Campaign:
         here = self.gap(i, common, own)
         for k in rest.tolist():
             slopes[:, :, k] = (self.gap(i, _moved(common, k), own) - here) / DIFFERENCE_STEP
-        return slopes
+        return slopes if self.hull.together is None else slopes @ self.hull.together
 
     def linearised(self, i: int, common: Floats, own: Floats, hull_slopes: Floats) -> tuple[Floats, Floats]:
         """Return the gaps of a log and their derivatives by both vectors, shapes (J, 3) and (J, 3, g + l)."""

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from ferryid.effects.force_model import ForceModel, Measurements, hull_of
+from ferryid.effects.force_model import COEFFICIENTS, ForceModel, Measurements, hull_of
 from ferryid.effects.hull_spread import default_hull_spread
 from ferryid.effects.measurements import hull_force_model
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.errors import FerryIdError
 from ferryid.models import Model
-from ferryid.models.forces import ModelForces
+from ferryid.models.forces import ModelForces, hull_covariance
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
 
@@ -58,6 +58,28 @@ def prior_force_model(
         else default_hull_spread(profile, measurements.nu[measurements.usable])
     )
     return replace(bare, external=measurements.air_load, ambient=lambda now: now.air_load), spread
+
+
+def correlation_root(model: Model, spread: Floats) -> Floats | None:
+    """Return the Cholesky factor of the correlation of a model's coefficients in its prior, shape (h, h); None without any.
+
+    The fit's covariance is a part of the prior's variance; the rest, by which formulas may be off, is independent. Where a
+    diagnosis refitted the hull, intervals are stored alone.
+
+    Parameters
+    ----------
+    model
+        The model.
+    spread
+        Standard deviations of the prior, `COEFFICIENTS` first, shape (h,).
+    """
+    if model.hull:
+        return None
+    n, covariance = len(COEFFICIENTS), hull_covariance(model)
+    scale = np.where(spread[:n] > 0.0, spread[:n], np.inf)
+    correlation = np.eye(len(spread))
+    correlation[:n, :n] += (covariance - np.diag(np.diag(covariance))) / np.outer(scale, scale)
+    return np.asarray(np.linalg.cholesky(correlation), dtype=np.float64) if covariance.any() else None
 
 
 def _modelled(measurements: Measurements, profile: Profile, model: Model, sha256: str) -> tuple[ForceModel, Floats]:

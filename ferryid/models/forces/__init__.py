@@ -8,7 +8,14 @@ from ferryid.models.forces.estimator import (
     model_estimator,
     replace_hull_coefficients,
 )
-from ferryid.models.forces.hull_terms import MAPPED, UnmappedTerms, beside_the_hull, hull_contribution, unmapped_terms
+from ferryid.models.forces.hull_terms import (
+    MAPPED,
+    UnmappedTerms,
+    beside_the_hull,
+    hull_contribution,
+    hull_covariance,
+    unmapped_terms,
+)
 from ferryid.models.forces.model_forces import ModelForces, acting_estimator, force_law
 from ferryid.models.forces.residual import FORMS, base_force, compute_residual, motion_force, scale_hull, without_inputs
 
@@ -27,6 +34,7 @@ __all__ = [
     "force_law",
     "hull_coefficients",
     "hull_contribution",
+    "hull_covariance",
     "model_estimator",
     "motion_force",
     "replace_hull_coefficients",

@@ -57,6 +57,23 @@ def hull_contribution(model: Model) -> tuple[Floats, Floats]:
     return part, variance
 
 
+def hull_covariance(model: Model) -> Floats:
+    """Return the covariance of what a model's terms add to the hull's coefficients, shape (26, 26).
+
+    Axes are fitted by themselves, so that coefficients of different axes do not vary together.
+    """
+    count = len(model.terms)
+    covariance = np.zeros((len(COEFFICIENTS), len(COEFFICIENTS)))
+    for axis in range(3):
+        picked = np.zeros((len(COEFFICIENTS), count))
+        for index, name in enumerate(COEFFICIENTS):
+            for term, of in MAPPED[name]:
+                if of == axis and term in model.terms:
+                    picked[index, model.terms.index(term)] = 1.0 if name.startswith("m") else -1.0
+        covariance += picked @ model.covariance[axis][:count, :count] @ picked.T
+    return covariance
+
+
 @dataclass(frozen=True, eq=False)
 class UnmappedTerms:
     """What a model's force has beside that of its hull.
