@@ -14,7 +14,7 @@ how far their hulls are apart.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -39,7 +39,7 @@ class Split:
     inside
         Which logs are the smaller part, shape (L,).
     gain
-        Held-out log-likelihood of two hulls over one.
+        Held-out log-likelihood of two hulls over one, beside the conditions that the logs may have.
     ratio
         Held-out squared force error with the common hull over that with the part's own: geometric mean over logs and axes of a
         part, the greater of the two.
@@ -50,14 +50,18 @@ class Split:
     ratio: float
 
     @property
-    def likelier(self) -> bool:
-        """True where two hulls predict held-out stretches far better."""
-        return self.gain.total >= JUDGING.split_gain
+    def likely(self) -> bool:
+        """True where they predict held-out stretches surely better, by more than logs of one vessel differ."""
+        return (
+            self.gain.total >= JUDGING.split_screening * JUDGING.split_gain
+            and self.gain.low > 0.0
+            and self.ratio >= JUDGING.split_ratio
+        )
 
     @property
     def found(self) -> bool:
-        """True where they surely do, and by more than logs of one vessel differ."""
-        return self.likelier and self.gain.low > 0.0 and self.ratio >= JUDGING.split_ratio
+        """True where they predict them far better."""
+        return self.gain.total >= JUDGING.split_gain
 
 
 def find_split(campaign: Campaign, reference: Flags) -> Split | None:
@@ -71,15 +75,15 @@ def find_split(campaign: Campaign, reference: Flags) -> Split | None:
         Which of them are references, shape (L,).
     """
     bare = estimate_campaign(without_conditions(campaign))
-    found = [one for one in _judged(bare, _ways(reference)) if one.found]
-    if not found:
+    likely = [one for one in _judged(bare, _ways(reference)) if one.likely]
+    if not likely:
         return None
-    best = max(found, key=lambda one: one.gain.total)
-    if not campaign.conditions:
-        return best
-    # A wind or a current of one log must not look like another hull.
-    (beside,) = _judged(estimate_campaign(campaign), [best.inside])
-    return best if beside.likelier else None
+    best = max(likely, key=lambda one: one.gain.total)
+    if campaign.conditions:
+        # A wind or a current of one log must not look like another hull, nor hide one.
+        (beside,) = _judged(estimate_campaign(campaign), [best.inside])
+        best = replace(best, gain=beside.gain)
+    return best if best.found else None
 
 
 def _ways(reference: Flags) -> list[Flags]:

@@ -256,6 +256,12 @@ class JudgingThresholds:
         "least held-out squared force error of a part with the common hull over that with its own",
         "tuned with the gain: to part one vessel is worse than to keep two together",
     )
+    split_screening: float = threshold(
+        0.5,
+        "of that gain",
+        "least gain without any wind or current of the logs for which these are estimated beside two hulls",
+        "convention: half; what conditions do is noise there",
+    )
     usual_disagreement: float = threshold(
         2.0,
         "-",

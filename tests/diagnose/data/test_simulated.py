@@ -1,0 +1,77 @@
+"""Logs of a simulator are recognised by their messages, or by the noise that they lack."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+import pytest
+
+from ferryid.diagnose.data.measurements import MeasuredLog, Survey
+from ferryid.diagnose.data.simulated import relative_noise, simulated
+from ferryid.effects.force_model import Measurements
+from ferryid.ingest.log import Topic
+from ferryid.vessel import load_profile
+
+FERRY = load_profile("milliampere")
+
+
+def circling(noise_m: float = 0.0) -> Measurements:
+    """Return five minutes of turns at 10 Hz, the position with some noise."""
+    t = np.arange(3000) * 0.1
+    psi = 2.0 * np.sin(0.05 * t)
+    u, r = 0.5 + 0.2 * np.sin(0.1 * t), 0.1 * np.cos(0.05 * t)
+    velocity = np.column_stack([u * np.cos(psi), u * np.sin(psi)])
+    # By the trapezoid rule on a grid a hundred times as fine, which is exact here.
+    fine = np.linspace(0.0, t[-1], 100 * (len(t) - 1) + 1)
+    heading, speed = 2.0 * np.sin(0.05 * fine), 0.5 + 0.2 * np.sin(0.1 * fine)
+    rate = np.column_stack([speed * np.cos(heading), speed * np.sin(heading)])
+    steps = 0.5 * (rate[1:] + rate[:-1]) * (fine[1] - fine[0])
+    place = np.vstack([np.zeros(2), np.cumsum(steps, axis=0)])[::100]
+    place += noise_m * np.random.default_rng(0).standard_normal(place.shape)
+    assert velocity.shape == place.shape
+    nu = np.column_stack([u, np.zeros_like(u), r])
+    parts, angles = np.zeros((len(t), 2, 3)), np.zeros((len(t), 2))
+    usable = np.ones(len(t), dtype=np.bool_)
+    return Measurements(
+        profile=FERRY,
+        t=t,
+        eta=np.column_stack([place, psi]),
+        nu_raw=nu,
+        nu=nu,
+        parts=parts,
+        angles=angles,
+        usable=usable,
+        wind=None,
+        current=None,
+        payload=None,
+    )
+
+
+def log(measurements: Measurements, found: tuple[str, ...] = ("u", "v", "r"), type_: str = "") -> MeasuredLog:
+    topics = (Topic("/gazebo/model_states", type_, "ros1", 10, 0, 1, {}),) if type_ else ()
+    recording = SimpleNamespace(topics=topics, found=dict.fromkeys(found, ""))
+    return MeasuredLog("a.bag", measurements, cast("Survey", SimpleNamespace(recording=recording)))
+
+
+def test_a_log_without_noise_is_simulated_and_one_with_a_millimetre_is_not() -> None:
+    assert relative_noise(circling()).max() < 1e-4
+    assert "no noise" in simulated(log(circling()))
+    assert simulated(log(circling(0.001))) == ""
+
+
+def test_velocities_that_come_from_positions_say_nothing() -> None:
+    assert simulated(log(circling(), found=("x", "y", "psi"))) == ""
+
+
+@pytest.mark.parametrize(("type_", "artificial"), [("gazebo_msgs/ModelStates", True), ("nav_msgs/Odometry", False)])
+def test_messages_of_a_simulator_show_it(type_: str, artificial: bool) -> None:
+    assert bool(simulated(log(circling(0.02), type_=type_))) == artificial
+
+
+def test_a_log_at_rest_is_not_simulated() -> None:
+    still = circling()
+    at_rest = replace(still, nu_raw=np.zeros_like(still.nu_raw), eta=np.zeros_like(still.eta))
+    assert simulated(log(at_rest)) == ""

@@ -1,0 +1,44 @@
+"""A log of another vessel in a campaign, references of another vessel, and logs of one vessel in different winds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ferryid.diagnose.inference.campaign_model import Campaign, Member
+from ferryid.diagnose.judging.campaign_split import find_split
+from tests.diagnose.inference.test_campaign_estimation import CALM, WINDS, campaign
+
+pytestmark = pytest.mark.slow
+
+NONE = np.zeros(3, dtype=np.bool_)
+
+
+def heavy(member: Member, factor: float) -> Member:
+    """Return a log as of a vessel on which forces of all actuators are a factor larger."""
+    plain = replace(member.plain, parts=factor * member.plain.parts)
+    measured = replace(member.windows.measurements, parts=factor * member.windows.measurements.parts)
+    return replace(member, windows=replace(member.windows, measurements=measured), plain=plain)
+
+
+@pytest.mark.parametrize("winds", [WINDS, CALM])
+def test_logs_of_one_vessel_stay_together_in_whatever_wind(winds: tuple[tuple[float, float], ...]) -> None:
+    assert find_split(campaign(winds), NONE) is None
+
+
+def test_a_log_of_another_vessel_is_found() -> None:
+    split = find_split(campaign(factor=2.0), NONE)
+    assert split is not None
+    assert split.inside.tolist() == [False, False, True]
+    assert split.gain.low > 30.0
+    assert split.ratio > 2.5
+
+
+def test_references_of_another_vessel_are_found() -> None:
+    members = campaign().members
+    other = tuple(heavy(one, 2.0) for one in members[1:])
+    split = find_split(Campaign((*members[:2], *other), campaign().hull), np.array([False, False, True, True]))
+    assert split is not None
+    assert split.inside.tolist() in ([False, False, True, True], [True, True, False, False])
