@@ -60,6 +60,13 @@ def test_a_wind_is_named_in_every_log_of_a_campaign_and_kept_in_its_model(
             assert wind["parameters"][name]["low"] < true < wind["parameters"][name]["high"]
             assert wind["parameters"][name]["value"] == pytest.approx(true, abs=0.4)
         assert any("estimated with one hull for all 3: confirmed" in note for note in one["notes"])
+        # The errors of the log are held out, without the wind and with it; so are those of the finding, and of its figure.
+        assert one["after"]["mse"]["yaw"] < 0.7 * one["before"]["mse"]["yaw"]
+        assert one["after"]["ratio"]["yaw"]["high"] < 1.0
+        assert wind["mse"] == {name: one[name]["mse"] for name in ("before", "after")}
+    assert "With it, the squared force error on data that it was not fitted to falls" in Path(made["report"]).read_text(
+        "utf-8"
+    )
     model = json.loads(Path(made["model"]).read_text("utf-8"))
     assert [one["name"] for one in model["training"]] == ["bag1", "bag2", "bag3"]
     for one, log in zip(model["conditions"], made["logs"], strict=True):
@@ -111,3 +118,35 @@ def test_logs_of_which_none_can_be_used_are_refused(ferryid: Command, tmp_path: 
     run = ferryid("diagnose", tmp_path / "a.csv", tmp_path / "b.csv", *VESSEL, "--out", tmp_path)
     assert run.code == 2
     assert run.err.count("Fix:") == 1
+
+
+def test_references_bring_the_hull_and_have_no_diagnosis(ferryid: Command, bags: list[Path], tmp_path: Path) -> None:
+    made = result(ferryid("diagnose", bags[0], "--reference", *bags[1:], *VESSEL, "--out", tmp_path, "--json", "-"))
+    conforms(json.dumps(made))
+    assert made["log"] == "bag1"
+    assert "logs" not in made
+    (wind,) = (finding for finding in made["findings"] if finding["effect"] == "wind")
+    assert wind["parameters"]["north"]["value"] == pytest.approx(-3.0, abs=0.5)
+    assert any(note.startswith("References: bag2.mcap and bag3.mcap.") for note in made["notes"])
+    model = json.loads(Path(made["model"]).read_text("utf-8"))
+    assert [one["name"] for one in model["training"]] == ["bag1"]
+
+
+def test_a_reference_that_cannot_serve_is_refused(ferryid: Command, bags: list[Path], tmp_path: Path) -> None:
+    copy = shutil.copy(bags[0], tmp_path / "copy.mcap")
+    foreign = tmp_path / "foreign.csv"
+    foreign.write_text("time,temperature\n0,1\n1,2\n2,3\n", encoding="utf-8")
+    for other, cause in (
+        (bags[0], "it is one of the logs to be diagnosed"),
+        (copy, "it holds the motion of"),
+        (tmp_path / "nowhere.mcap", "no such file"),
+        (foreign, "foreign.csv"),
+    ):
+        run = ferryid("diagnose", bags[0], "--reference", other, *VESSEL, "--out", tmp_path)
+        assert run.code == 2
+        assert cause in run.err
+        assert run.err.count("Fix:") == 1
+    run = ferryid("diagnose", bags[0], "--against", bags[1], "--reference", bags[2], *VESSEL, "--out", tmp_path)
+    assert run.code == 2
+    assert "both --against and --reference" in run.err
+    assert not (tmp_path / "reports").exists()

@@ -114,6 +114,7 @@ NO_DECISION = {
         diagnose.inference.search COARSE_ITERATIONS
         diagnose.inference.stochastic_disturbance START_STRENGTHS START_FREQUENCIES
         diagnose.judging.findings TIME_STEP TIME_FIT TIME_FINE_S
+        diagnose.judging.campaign_split WEIGHED
         effects.gusts DIFFERENCE_MPS
         effects.linear_evidence DIFFERENCE_STEP
         effects.shallow_water CELLS
@@ -134,6 +135,7 @@ NO_DECISION = {
         diagnose.inference.onset_estimation MOST_VALUES
         diagnose.inference.simulation_baseline SHOWN_ROWS
         diagnose.judging.error_profiles SECTORS SPEEDS PLACES TIMES
+        diagnose.gathering CLOCK_SET_NS SHOWN_OVERLAPS
         diagnose.judging.findings SHOWN_RIVALS
         diagnose.judging.unexplained SPANS
         identify.archive MOST_DRAWN

@@ -245,22 +245,22 @@ class JudgingThresholds:
         3, "logs", "least size of a campaign in which one log can be the exception", "derived: a majority needs three"
     )
     split_gain: float = threshold(
-        60.0,
+        80.0,
         "nat",
         "least held-out log-likelihood of two hulls over one for which a campaign is parted",
-        "tuned on real campaigns of one vessel and 400 parts of them, together with the ratio: the nearest has 72 and 2.2",
+        "tuned on real campaigns of one vessel and 1000 parts of them, together with the ratio: the nearest has 63 and 2.3",
     )
     split_ratio: float = threshold(
         2.5,
         "-",
         "least held-out squared force error of a part with the common hull over that with its own",
-        "tuned with the gain: to part one vessel is worse than to keep two together",
+        "tuned on the same, with the gain: to part one vessel is worse than to keep two together",
     )
     split_screening: float = threshold(
-        0.5,
+        0.4,
         "of that gain",
         "least gain without any wind or current of the logs for which these are estimated beside two hulls",
-        "convention: half; what conditions do is noise there",
+        "convention: less than half, as what conditions do is noise there",
     )
     usual_disagreement: float = threshold(
         2.0,

@@ -1,0 +1,99 @@
+"""Which logs of a campaign are used, and which belong together: a change of hull between days, a foreign log, references."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from ferryid.diagnose.gathering import Gathered, gather, part, without_logs
+from ferryid.diagnose.inference.stages import AveragedLog
+from ferryid.effects.force_model import COEFFICIENTS
+from ferryid.errors import FerryIdError
+from ferryid.simulate import parse_scenario, simulate, write_log
+from ferryid.types import IN_MEMORY
+from tests.diagnose.trials import FERRY
+
+pytestmark = pytest.mark.slow
+
+SCENARIO = """schema = "ferryid.scenario/1"
+vessel = "milliampere"
+start = 2021-04-2{day}T1{hour}:00:00Z
+path = {{ kind = "twelve-corner", dwell_s = 15 }}
+controller = {{ delta = 0.7, sigma = 0.7 }}
+sensors = {{ imu_rate_hz = 0.0, camera_rate_hz = 0.0 }}
+"""
+HEAVY = 1.7
+
+
+@pytest.fixture(scope="module")
+def days(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """Two days of two logs, with files of one name; on the second all of the vessel's hull is larger."""
+    folder, made = tmp_path_factory.mktemp("days"), []
+    for day in (0, 1):
+        for hour in (1, 2):
+            scenario = parse_scenario(SCENARIO.format(day=day, hour=hour), f"run{hour}")
+            hull = dict.fromkeys((name for name in COEFFICIENTS if name[2:] not in ("23", "32")), HEAVY) if day else {}
+            path = folder / f"day{day + 1}" / f"run{hour}.mcap"
+            path.parent.mkdir(exist_ok=True)
+            write_log(simulate(replace(scenario, true_hull=hull), 10 * day + hour), path)
+            made.append(str(path))
+    return made
+
+
+@pytest.fixture(scope="module")
+def logs(days: list[str]) -> tuple[AveragedLog, ...]:
+    return gather(days, FERRY, IN_MEMORY).logs
+
+
+def paths(found: tuple[AveragedLog, ...]) -> list[str]:
+    return [one.path for one in found]
+
+
+def test_a_campaign_is_split_where_the_hull_changed(days: list[str], logs: tuple[AveragedLog, ...]) -> None:
+    # The order in which logs are given is not that of time.
+    groups = part(Gathered((*logs[2:], *logs[:2])), Gathered(()), FERRY, None)
+    assert [paths(one.logs) for one in groups] == [days[:2], days[2:]]
+    for group in groups:
+        (note,) = group.notes
+        assert note.startswith("The campaign is split in two: no common hull fits")
+        assert "day1/run1.mcap and day1/run2.mcap" in note
+
+
+def test_a_log_of_another_vessel_is_left_out(days: list[str], logs: tuple[AveragedLog, ...]) -> None:
+    (group,) = part(Gathered(logs[:3]), Gathered(()), FERRY, None)
+    assert paths(group.logs) == days[:2]
+    (note,) = group.notes
+    assert note.startswith(f"Left out of the campaign: {days[2]}: no common hull fits it and the 2 other logs")
+
+
+def test_references_of_another_vessel_are_left_out(days: list[str], logs: tuple[AveragedLog, ...]) -> None:
+    (group,) = part(Gathered(logs[:1]), Gathered(logs[2:]), FERRY, None)
+    assert (paths(group.logs), group.references) == (days[:1], ())
+    (note,) = group.notes
+    assert note.startswith("Left out of the references: day2/run1.mcap and day2/run2.mcap")
+
+
+def test_logs_and_references_of_one_vessel_stay_together(logs: tuple[AveragedLog, ...]) -> None:
+    (group,) = part(Gathered(logs[:1]), Gathered(logs[1:2]), FERRY, None)
+    assert (group.logs, group.references, group.notes) == (logs[:1], logs[1:2], ())
+
+
+def test_times_that_overlap_are_noted(days: list[str], tmp_path: Path) -> None:
+    path = tmp_path / "late.mcap"
+    late = parse_scenario(SCENARIO.format(day=0, hour=1).replace("T11:00", "T11:01"), "late")
+    write_log(simulate(late, 5), path)
+    (note,) = gather([days[0], str(path)], FERRY, IN_MEMORY).notes
+    assert note.startswith("The times of logs overlap")
+    assert "run1.mcap and late.mcap by" in note
+    assert gather(days[:2], FERRY, IN_MEMORY).notes == ()
+
+
+def test_references_that_are_logs_are_refused(logs: tuple[AveragedLog, ...]) -> None:
+    kept = without_logs(Gathered(logs[1:3]), logs[:1])
+    assert kept.logs == logs[1:3]
+    again = replace(logs[0], screened=replace(logs[0].screened, measured=replace(logs[0].screened.measured, path="b")))
+    assert without_logs(Gathered((again, logs[1])), logs[:1]).logs == logs[1:2]
+    with pytest.raises(FerryIdError, match="holds the motion of"):
+        without_logs(Gathered((again,)), logs[:1])
