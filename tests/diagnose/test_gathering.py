@@ -72,7 +72,7 @@ def test_references_of_another_vessel_are_left_out(days: list[str], logs: tuple[
     (group,) = part(Gathered(logs[:1]), Gathered(logs[2:]), FERRY, None)
     assert (paths(group.logs), group.references) == (days[:1], ())
     (note,) = group.notes
-    assert note.startswith("Left out of the references: day2/run1.mcap and day2/run2.mcap")
+    assert note.startswith("Left out of the references: day2/run1.mcap and run2.mcap: no common hull")
 
 
 def test_logs_and_references_of_one_vessel_stay_together(logs: tuple[AveragedLog, ...]) -> None:
