@@ -163,7 +163,8 @@ def _in_time(logs: Sequence[AveragedLog]) -> list[AveragedLog]:
 
 
 def _parted(group: Group, profile: Profile, model: Model | None) -> list[Group]:
-    assembled = assemble(_in_time([*group.logs, *group.references]), profile, model)
+    brought = {one.path for one in group.references}
+    assembled = assemble(_in_time([*group.logs, *group.references]), profile, model, brought)
     if assembled is None:
         return [group]
     campaign, place = assembled

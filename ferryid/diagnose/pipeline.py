@@ -154,7 +154,8 @@ def _baseline(
     """Return what logs are compared with, and what the logs of a campaign say together."""
     if settings.against is not None:
         return SimulationBaseline(learn_simulation(settings.against, profile, run)), None
-    assembled = assemble([*group.logs, *group.references], profile, settings.model)
+    brought = {one.path for one in group.references}
+    assembled = assemble([*group.logs, *group.references], profile, settings.model, brought)
     if assembled is None:
         return HullBaseline(profile, settings.model), None
     together = judge_campaign(*assembled, run.progress)

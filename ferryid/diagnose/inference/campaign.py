@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import sqrt
 
@@ -63,7 +63,7 @@ class CommonHull:
 
 
 def assemble(
-    logs: Sequence[AveragedLog], profile: Profile, model: Model | None = None
+    logs: Sequence[AveragedLog], profile: Profile, model: Model | None = None, references: Collection[str] = ()
 ) -> tuple[Campaign, dict[str, int]] | None:
     """Return the campaign of several logs, and the place of each path in it; None where they are too few or too short.
 
@@ -75,6 +75,10 @@ def assemble(
         The vessel.
     model
         A model that brings the hull; the profile's where None.
+    references
+        Paths of those that bring the hull only. One that measured a condition which a log did not, such as the wind, has no
+        other condition either: all that a log may have is then judged on the same logs, so that a current which the references
+        speak for does not stand in for the wind of a log.
     """
     members: list[Member] = []
     spreads: list[Floats] = []
@@ -91,6 +95,7 @@ def assemble(
         spreads.append(spread)
     if len(members) < 2 or sum(len(one.windows.starts) for one in members) < INFERENCE.fewest_windows:
         return None
+    members = _conditions_of_logs(members, [path in references for path in place])
     length, _, draught = dimensions(profile)
     known = model is not None or profile.hull.has_model
     size = np.zeros(len(INDUCED)) if known else induced_spread(length, draught)
@@ -98,6 +103,17 @@ def assemble(
     spread = np.append(np.max(spreads, axis=0), size)
     prior = HullPrior(mean, spread, known, None if model is None else correlation_root(model, spread))
     return Campaign(tuple(members), prior), place
+
+
+def _conditions_of_logs(members: Sequence[Member], reference: Sequence[bool]) -> list[Member]:
+    """Return the logs of a campaign without conditions of references that measured one that a log did not."""
+    wanted = {
+        one.key for member, brings in zip(members, reference, strict=True) if not brings for one in member.conditions
+    }
+    return [
+        replace(member, conditions=()) if brings and not wanted <= {one.key for one in member.conditions} else member
+        for member, brings in zip(members, reference, strict=True)
+    ]
 
 
 def repeated(logs: Sequence[AveragedLog]) -> list[tuple[str, str]]:

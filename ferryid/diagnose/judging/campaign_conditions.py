@@ -11,13 +11,14 @@ confirmed may still be estimated: it is reported as such.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import exp
 from typing import Any
 
 import numpy as np
 
+from ferryid.counts import counted
 from ferryid.diagnose.data.course import Course
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.campaign import CommonHull
@@ -39,6 +40,7 @@ from ferryid.diagnose.judging.figure_data import axis_of_errors, error_columns
 from ferryid.diagnose.judging.finding import Finding, Rival
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
+from ferryid.effects.wording import listed
 from ferryid.types import AXES, Floats
 
 
@@ -91,6 +93,8 @@ class ConditionTest:
         Held-out log-likelihood over that of no such condition.
     placebos
         Conditions that cannot be true, by the headings that they stand on.
+    unresolved
+        Other conditions that held-out data confirm as well in its place, and that are hardly less likely.
     """
 
     effect: str
@@ -100,6 +104,7 @@ class ConditionTest:
     evidence: float
     gain: Gain
     placebos: Mapping[str, PlaceboTest]
+    unresolved: tuple[str, ...] = ()
 
     @cached_property
     def courses(self) -> tuple[Course, ...]:
@@ -134,6 +139,8 @@ class ConditionTest:
         for place, placebo in self.placebos.items():
             if not placebo.beaten:
                 return f"one on {place}, which cannot be true, explains about as much"
+        if self.unresolved:
+            return f"a {listed([effects()[one].title.lower() for one in self.unresolved])} explains about as much"
         return ""
 
     @property
@@ -191,6 +198,15 @@ def judge_conditions(campaign: Campaign, place: Mapping[str, int], progress: Cal
         gain = Gain.of(held_out_loss(made).gain(held_out_loss(alone)))
         if made.evidence - alone.evidence >= INFERENCE.prior_odds and gain.low > 0.0:
             kept, fit = [*kept, other], made
+    near = [
+        one for one in confirmed if one not in kept and best.evidence - one.evidence < JUDGING.unresolved_evidence
+    ]
+    if near and len(kept) == 1:
+        # Either is confirmed and not both: which of them acts is not known, and the hull is better without a wrong one.
+        names = [best.effect, *(one.effect for one in near)]
+        open_ = {name: tuple(other for other in names if other != name) for name in names}
+        tests = [replace(one, unresolved=open_.get(one.effect, ())) for one in tests]
+        return JudgedConditions(CommonHull(estimate_campaign(without_conditions(campaign)), place), tuple(tests))
     left = [one for one in tests if one in kept or not one.confirmed]
     return JudgedConditions(CommonHull(fit, place), tuple(left))
 
@@ -253,6 +269,8 @@ def _finding(test: ConditionTest, i: int, tests: tuple[ConditionTest, ...]) -> F
         rivals=tuple(
             Rival(one.effect, None, one.evidence - test.evidence) for one in tests if one.effect != test.effect
         ),
+        unresolved_with=test.unresolved,
+        separating_manoeuvre=manoeuvre(test.effect, test.unresolved),
         says=says,
         course=test.courses[i] if test.courses else None,
         **_figure(test, i, errors, shares, value),
@@ -270,8 +288,10 @@ def _figure(test: ConditionTest, i: int, errors: LogErrors, shares: Floats, valu
 def note(test: ConditionTest, logs: int) -> str:
     """Return what was tested, as a sentence."""
     title, found = effects()[test.effect].title, "confirmed" if test.confirmed else "not confirmed"
+    have = sum(any(each.effect.id == test.effect for each in one.conditions) for one in test.fit.campaign.members)
     told = (
-        f"{title} of each log, estimated with one hull for all {logs}: {found}. "
+        f"{title} of {'each log' if have == logs else f'{have} of {counted(logs, "log")}'}, estimated with one hull for all "
+        f"{logs}: {found}. "
         f"Over none, evidence {test.evidence:+.0f} nat, likelihood of held-out stretches {_range(test.gain)}"
     )
     for place, one in test.placebos.items():
