@@ -92,6 +92,11 @@ def gather(
             "themselves"
             for path, why in artificial.items()
         ]
+    elif artificial:
+        notes += [
+            f"{path} is no recording of a vessel: {why}. What is found in it is the simulator's."
+            for path, why in artificial.items()
+        ]
     return Gathered(tuple(found), (*notes, *_clocks(found)))
 
 

@@ -1,4 +1,9 @@
-"""Which logs come from a simulator and not from a vessel: by their message types, or since nothing in them is noisy."""
+"""Which logs come from a simulator and not from a vessel: by their message types, or since nothing in them is noisy.
+
+Two signs are in the numbers. A solution of equations of motion has no noise between pose and velocity. And a simulator that
+adds up its velocities step by step, as a dead reckoning does, leaves steps of the position that are the speed times one length
+of time to the last digit: no sensor measures that, so that the positions are no measurement beside the velocities.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +12,7 @@ import numpy as np
 from ferryid.diagnose.data.measurements import MeasuredLog
 from ferryid.diagnose.data.thresholds import DATA
 from ferryid.effects.force_model import Measurements
+from ferryid.signals.stream import Recording, Stream
 from ferryid.types import Floats
 
 SIMULATORS = (
@@ -18,6 +24,8 @@ SIMULATORS = (
 )
 """Beginnings of the names of messages that simulators alone send."""
 VELOCITIES = (("u", "v"), ("vel_N", "vel_E"))
+MOVING_STEPS, VARIED = 50, 0.05
+"""Fewest steps, and by how much of the greatest speed it must vary, for steps of the position to show where they come from."""
 
 
 def simulated(log: MeasuredLog) -> str:
@@ -26,6 +34,8 @@ def simulated(log: MeasuredLog) -> str:
     for topic in recording.topics:
         if topic.count and topic.type.startswith(SIMULATORS):
             return f"its topic {topic.name} holds messages of a simulator ({topic.type})"
+    if summed := _summed(recording):
+        return summed
     measured = any(all(name in recording.found for name in pair) for pair in VELOCITIES)
     if not (measured and "r" in recording.found):
         # Velocities that are derived from the positions agree with them.
@@ -37,6 +47,41 @@ def simulated(log: MeasuredLog) -> str:
             f"{float(noise.max()):.1g} of the velocities' standard deviation"
         )
     return ""
+
+
+def _summed(recording: Recording) -> str:
+    """Return that positions are the sum of the velocities, where one topic has both; empty where they are not."""
+    for stream in recording.streams.values():
+        for names in VELOCITIES:
+            if not all(name in stream.columns for name in ("x", "y", *names)):
+                continue
+            if summed_share(stream, names) >= DATA.summed_share:
+                sway = stream.columns[names[1]]
+                still = ", and the sway velocity is zero throughout" if names == VELOCITIES[0] and not sway.any() else ""
+                return (
+                    f"each step of its positions is the speed of {stream.topic} times one length of time to the last "
+                    f"digit{still}: they are simulated, or reckoned from the velocities, and not measured"
+                )
+    return ""
+
+
+def summed_share(stream: Stream, velocity: tuple[str, str]) -> float:
+    """Return the share of steps of the position that are the speed before or after them times one length of time.
+
+    Lengths are compared, so that no heading is needed; 0 where the vessel hardly moves or its speed is all but constant, which
+    shows nothing.
+    """
+    step = np.hypot(np.diff(stream.columns["x"]), np.diff(stream.columns["y"]))
+    speed = np.hypot(*(stream.columns[name] for name in velocity))
+    best = 0.0
+    for beside in (speed[:-1], speed[1:]):
+        moving = np.isfinite(step) & (beside > DATA.summed_digits * np.nanmax(speed, initial=0.0))
+        if np.count_nonzero(moving) < MOVING_STEPS or np.ptp(beside[moving]) <= VARIED * np.max(beside[moving]):
+            continue
+        length_s = float(np.median(step[moving] / beside[moving]))
+        away = np.abs(step[moving] - length_s * beside[moving])
+        best = max(best, float(np.mean(away <= DATA.summed_digits * length_s * np.median(beside[moving]))))
+    return best
 
 
 def relative_noise(measurements: Measurements) -> Floats:

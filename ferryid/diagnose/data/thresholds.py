@@ -44,6 +44,18 @@ class DataThresholds:
         "difference between steps of the pose and the integral of the velocity below which a log is a simulator's",
         "convention: a fifth of what optical tracking on a carriage in a tank leaves on its worst axis",
     )
+    summed_digits: float = threshold(
+        1e-5,
+        "of the usual step",
+        "difference between a step of the position and the speed times one length of time below which it is their sum",
+        "convention: far above the roundings of double precision, 1e-11 on paths of kilometres, and far below any sensor's errors",
+    )
+    summed_share: float = threshold(
+        0.9,
+        "of the steps",
+        "steps of the position that are a sum of velocities for which no position is a measurement",
+        "convention: nearly all; a simulation may have been set back to its start in between",
+    )
 
 
 DATA = DataThresholds()

@@ -289,9 +289,9 @@ def note(test: ConditionTest, logs: int) -> str:
     """Return what was tested, as a sentence."""
     title, found = effects()[test.effect].title, "confirmed" if test.confirmed else "not confirmed"
     have = sum(any(each.effect.id == test.effect for each in one.conditions) for one in test.fit.campaign.members)
+    whose = "each log" if have == logs else f"{have} of {counted(logs, 'log')}"
     told = (
-        f"{title} of {'each log' if have == logs else f'{have} of {counted(logs, "log")}'}, estimated with one hull for all "
-        f"{logs}: {found}. "
+        f"{title} of {whose}, estimated with one hull for all {logs}: {found}. "
         f"Over none, evidence {test.evidence:+.0f} nat, likelihood of held-out stretches {_range(test.gain)}"
     )
     for place, one in test.placebos.items():
