@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.diagnose.data.simulated import artificial
 from ferryid.diagnose.data.thresholds import DATA
 from ferryid.effects.force_model import Measurements
 from ferryid.effects.measurements import actuator_forces, interpolate_gaps
@@ -133,11 +134,18 @@ def read_measurements(
         )
     run.progress(f"reading {Path(path).name}")
     recording = record(path, profile, run.tables, verify=run.verify)
-    check_sampling(recording, profile)
-    faults = find_faults(recording)
-    track = align(recording, profile, faults=faults)
-    track, hidden = _without(track, withhold)
-    measured = measure(track, profile)
+    try:
+        check_sampling(recording, profile)
+        faults = find_faults(recording)
+        track, hidden = _without(align(recording, profile, faults=faults), withhold)
+        measured = measure(track, profile)
+    except FerryIdError as error:
+        if not (why := artificial(recording)):
+            raise
+        # What a simulator leaves out is not missing in a recording.
+        raise FerryIdError(
+            f"{recording.name}: no recording of a vessel, {why}. Fix: use recorded logs, or map measured signals in the profile"
+        ) from error
     motion = smooth_measured(measured, window_s)
     measurements = _measurements(track, measured, profile, window_s)
     doubts = doubts_of(recording, track)

@@ -7,13 +7,17 @@ of time to the last digit: no sensor measures that, so that the positions are no
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from ferryid.diagnose.data.measurements import MeasuredLog
 from ferryid.diagnose.data.thresholds import DATA
 from ferryid.effects.force_model import Measurements
 from ferryid.signals.stream import Recording, Stream
 from ferryid.types import Floats
+
+if TYPE_CHECKING:
+    from ferryid.diagnose.data.measurements import MeasuredLog
 
 SIMULATORS = (
     "gazebo_msgs/",
@@ -31,11 +35,8 @@ MOVING_STEPS, VARIED = 50, 0.05
 def simulated(log: MeasuredLog) -> str:
     """Return what shows that a log is a simulator's, as the end of a sentence; empty where nothing does."""
     recording = log.survey.recording
-    for topic in recording.topics:
-        if topic.count and topic.type.startswith(SIMULATORS):
-            return f"its topic {topic.name} holds messages of a simulator ({topic.type})"
-    if summed := _summed(recording):
-        return summed
+    if why := artificial(recording):
+        return why
     measured = any(all(name in recording.found for name in pair) for pair in VELOCITIES)
     if not (measured and "r" in recording.found):
         # Velocities that are derived from the positions agree with them.
@@ -47,6 +48,14 @@ def simulated(log: MeasuredLog) -> str:
             f"{float(noise.max()):.1g} of the velocities' standard deviation"
         )
     return ""
+
+
+def artificial(recording: Recording) -> str:
+    """Return the same of a recording that need not be fit for a diagnosis."""
+    for topic in recording.topics:
+        if topic.count and topic.type.startswith(SIMULATORS):
+            return f"its topic {topic.name} holds messages of a simulator ({topic.type})"
+    return _summed(recording)
 
 
 def _summed(recording: Recording) -> str:
