@@ -155,6 +155,9 @@ def _judged(horizons: Floats, errors: Floats, block: Ints) -> FreeRuns:
     sums = [picks @ by_block(one**2, block) for one in flat]
     ratio = np.sqrt(sums[1] / np.where(sums[0] > 0.0, sums[0], np.nan))
     low, high = np.full(ratio.shape[1], np.nan), np.full(ratio.shape[1], np.nan)
-    low[counted_runs], high[counted_runs] = np.nanquantile(1.0 - ratio[:, counted_runs], [0.025, 0.975], axis=0)
+    if counted_runs.any():
+        low[counted_runs], high[counted_runs] = np.nanquantile(1.0 - ratio[:, counted_runs], [0.025, 0.975], axis=0)
     removed = 1.0 - after / before
-    return FreeRuns(horizons, before, after, removed, low.reshape(shape), high.reshape(shape), len(block))
+    # Where every run diverges, or the log has no stretch that is long enough, there is none.
+    starts = len(block) if counted_runs.any() else 0
+    return FreeRuns(horizons, before, after, removed, low.reshape(shape), high.reshape(shape), starts)

@@ -1,0 +1,24 @@
+"""Free runs that cannot be judged count as none."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ferryid.diagnose.judging.free_runs import _judged
+
+HORIZONS = np.array([1.0, 2.0])
+
+
+def test_runs_that_all_diverge_are_none() -> None:
+    runs = _judged(HORIZONS, np.full((2, 6, 2, 4), np.nan), np.arange(6))
+    assert runs.starts == 0
+    assert np.isnan(runs.low).all()
+
+
+def test_runs_that_reach_their_horizon_are_judged() -> None:
+    errors = np.ones((2, 6, 2, 4))
+    errors[1] = 0.5
+    runs = _judged(HORIZONS, errors, np.arange(6))
+    assert runs.starts == 6
+    assert np.allclose(runs.removed, 0.5)
+    assert np.allclose((runs.low, runs.high), 0.5)
