@@ -28,8 +28,6 @@ SIMULATORS = (
 )
 """Beginnings of the names of messages that simulators alone send."""
 VELOCITIES = (("u", "v"), ("vel_N", "vel_E"))
-MOVING_STEPS, VARIED = 50, 0.05
-"""Fewest steps, and by how much of the greatest speed it must vary, for steps of the position to show where they come from."""
 
 
 def simulated(log: MeasuredLog) -> str:
@@ -66,7 +64,9 @@ def _summed(recording: Recording) -> str:
                 continue
             if summed_share(stream, names) >= DATA.summed_share:
                 sway = stream.columns[names[1]]
-                still = ", and the sway velocity is zero throughout" if names == VELOCITIES[0] and not sway.any() else ""
+                still = (
+                    ", and the sway velocity is zero throughout" if names == VELOCITIES[0] and not sway.any() else ""
+                )
                 return (
                     f"each step of its positions is the speed of {stream.topic} times one length of time to the last "
                     f"digit{still}: they are simulated, or reckoned from the velocities, and not measured"
@@ -85,7 +85,9 @@ def summed_share(stream: Stream, velocity: tuple[str, str]) -> float:
     best = 0.0
     for beside in (speed[:-1], speed[1:]):
         moving = np.isfinite(step) & (beside > DATA.summed_digits * np.nanmax(speed, initial=0.0))
-        if np.count_nonzero(moving) < MOVING_STEPS or np.ptp(beside[moving]) <= VARIED * np.max(beside[moving]):
+        if np.count_nonzero(moving) < DATA.summed_steps:
+            continue
+        if np.ptp(beside[moving]) <= DATA.summed_variation * np.max(beside[moving]):
             continue
         length_s = float(np.median(step[moving] / beside[moving]))
         away = np.abs(step[moving] - length_s * beside[moving])

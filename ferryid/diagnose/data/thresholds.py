@@ -48,7 +48,19 @@ class DataThresholds:
         1e-5,
         "of the usual step",
         "difference between a step of the position and the speed times one length of time below which it is their sum",
-        "convention: far above the roundings of double precision, 1e-11 on paths of kilometres, and far below any sensor's errors",
+        "convention: far above the roundings of double precision, 1e-11 on paths of kilometres, and far below any sensor",
+    )
+    summed_steps: int = threshold(
+        50,
+        "steps",
+        "fewest steps of a moving vessel that show where its positions come from",
+        "convention: some seconds",
+    )
+    summed_variation: float = threshold(
+        0.05,
+        "of the greatest speed",
+        "by how much the speed must vary for its steps to show where they come from",
+        "convention: steps of a constant speed are as good as alike",
     )
     summed_share: float = threshold(
         0.9,

@@ -36,6 +36,7 @@ from ferryid.diagnose.judging.campaign_evidence import (
     without_conditions,
 )
 from ferryid.diagnose.judging.claims import Claim, Figures
+from ferryid.diagnose.judging.experiment_design import manoeuvre
 from ferryid.diagnose.judging.figure_data import axis_of_errors, error_columns
 from ferryid.diagnose.judging.finding import Finding, Rival
 from ferryid.diagnose.judging.thresholds import JUDGING
@@ -193,14 +194,9 @@ def judge_conditions(campaign: Campaign, place: Mapping[str, int], progress: Cal
     kept, fit = [best], best.fit
     for other in confirmed[1:]:
         both = with_conditions(campaign, frozenset(one.effect for one in (*kept, other)))
-        made = estimate_campaign(both)
-        alone = estimate_campaign(fit.campaign, noise=made.noise)
-        gain = Gain.of(held_out_loss(made).gain(held_out_loss(alone)))
-        if made.evidence - alone.evidence >= INFERENCE.prior_odds and gain.low > 0.0:
+        if (made := _beside(fit, both)) is not None:
             kept, fit = [*kept, other], made
-    near = [
-        one for one in confirmed if one not in kept and best.evidence - one.evidence < JUDGING.unresolved_evidence
-    ]
+    near = [one for one in confirmed if one not in kept and best.evidence - one.evidence < JUDGING.unresolved_evidence]
     if near and len(kept) == 1:
         # Either is confirmed and not both: which of them acts is not known, and the hull is better without a wrong one.
         names = [best.effect, *(one.effect for one in near)]
@@ -209,6 +205,14 @@ def judge_conditions(campaign: Campaign, place: Mapping[str, int], progress: Cal
         return JudgedConditions(CommonHull(estimate_campaign(without_conditions(campaign)), place), tuple(tests))
     left = [one for one in tests if one in kept or not one.confirmed]
     return JudgedConditions(CommonHull(fit, place), tuple(left))
+
+
+def _beside(fit: CampaignFit, both: Campaign) -> CampaignFit | None:
+    """Return the logs with one more condition than a fit has; None where that is not seen beside what it has."""
+    made = estimate_campaign(both)
+    alone = estimate_campaign(fit.campaign, noise=made.noise)
+    gain = Gain.of(held_out_loss(made).gain(held_out_loss(alone)))
+    return made if made.evidence - alone.evidence >= INFERENCE.prior_odds and gain.low > 0.0 else None
 
 
 def _tested(campaign: Campaign, progress: Callable[[str], None]) -> ConditionTest:

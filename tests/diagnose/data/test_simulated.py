@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.data.measurements import MeasuredLog, Survey
-from ferryid.diagnose.data.simulated import relative_noise, simulated
+from ferryid.diagnose.data.simulated import artificial, relative_noise, simulated, summed_share
 from ferryid.effects.force_model import Measurements
+from ferryid.ingest.clocks import ClockReport
 from ferryid.ingest.log import Topic
+from ferryid.signals.stream import Recording, Stream
 from ferryid.vessel import load_profile
 
 FERRY = load_profile("milliampere")
@@ -52,7 +54,7 @@ def circling(noise_m: float = 0.0) -> Measurements:
 
 def log(measurements: Measurements, found: tuple[str, ...] = ("u", "v", "r"), type_: str = "") -> MeasuredLog:
     topics = (Topic("/gazebo/model_states", type_, "ros1", 10, 0, 1, {}),) if type_ else ()
-    recording = SimpleNamespace(topics=topics, found=dict.fromkeys(found, ""))
+    recording = SimpleNamespace(topics=topics, found=dict.fromkeys(found, ""), streams={})
     return MeasuredLog("a.bag", measurements, cast("Survey", SimpleNamespace(recording=recording)))
 
 
@@ -60,6 +62,34 @@ def test_a_log_without_noise_is_simulated_and_one_with_a_millimetre_is_not() -> 
     assert relative_noise(circling()).max() < 1e-4
     assert "no noise" in simulated(log(circling()))
     assert simulated(log(circling(0.001))) == ""
+
+
+def reckoned(away_m: float = 0.0, jumps: int = 0, varied: float = 0.3) -> Stream:
+    """Return half a minute at 20 Hz whose positions are added up from surge velocity and heading, set back now and then."""
+    t = np.arange(600) * 0.05
+    u, psi = 1.0 + varied * np.sin(0.4 * t), 0.3 * t
+    x, y = np.cumsum(0.05 * u * np.cos(psi)), np.cumsum(0.05 * u * np.sin(psi))
+    for k in range(jumps):
+        x[100 * (k + 1) :] += 3.0
+    x += away_m * np.random.default_rng(1).standard_normal(len(x))
+    columns = {"x": x, "y": y, "u": u, "v": np.zeros_like(u)}
+    none = cast("ClockReport", None)
+    return Stream("/state", np.round(t * 1e9).astype(np.int64), columns, none, np.zeros(len(t), dtype=np.int64))
+
+
+def recording(stream: Stream) -> Recording:
+    return cast("Recording", SimpleNamespace(topics=(), streams={stream.topic: stream}))
+
+
+def test_positions_that_are_added_up_from_velocities_are_no_measurement() -> None:
+    why = artificial(recording(reckoned(jumps=3)))
+    assert "each step of its positions is the speed of /state times one length of time" in why
+    assert "the sway velocity is zero throughout" in why
+    assert artificial(recording(reckoned(away_m=1e-4))) == ""
+
+
+def test_steps_of_a_constant_speed_show_nothing() -> None:
+    assert summed_share(reckoned(varied=0.0), ("u", "v")) == 0.0
 
 
 def test_velocities_that_come_from_positions_say_nothing() -> None:

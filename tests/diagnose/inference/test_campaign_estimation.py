@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.data.measurements import window_lengths
-from ferryid.diagnose.inference.campaign import CommonHull
+from ferryid.diagnose.inference.campaign import CommonHull, _conditions_of_logs
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit, estimate_campaign
 from ferryid.diagnose.inference.campaign_model import INDUCED, Campaign, HullPrior, Member
 from ferryid.diagnose.inference.estimation import Candidate, estimation_problem, fit
 from ferryid.diagnose.inference.weak_form import windows
-from ferryid.diagnose.judging.campaign_conditions import judge_conditions, note
+from ferryid.diagnose.judging import campaign_conditions
+from ferryid.diagnose.judging.campaign_conditions import ConditionTest, judge_conditions, note
 from ferryid.diagnose.judging.campaign_evidence import EXCHANGED, MIRRORED, placebos, without_conditions
 from ferryid.effects import effects
 from ferryid.effects.force_model import ForceModel, hull_of
@@ -147,6 +148,43 @@ def test_winds_are_confirmed_over_all_logs_and_a_current_is_not() -> None:
         assert claim.finding.probability > 0.9
     assert judged.claims("d") == ()
     assert ": confirmed." in note(wind, 3)
+
+
+def test_two_conditions_that_are_confirmed_alike_are_hints(monkeypatch: pytest.MonkeyPatch) -> None:
+    (wind,) = judge_conditions(campaign(), {"a": 0, "b": 1, "c": 2}, no_progress).tests
+    assert wind.confirmed
+    behind = {"wind": 0.0}
+
+    def tested(made: Campaign, _: object) -> ConditionTest:
+        (name,) = {one.effect.id for one in made.conditions}
+        return replace(wind, effect=name, fit=replace(wind.fit, campaign=made), evidence=wind.evidence - behind[name])
+
+    both = campaign(conditions=("wind", "current"))
+    monkeypatch.setattr(campaign_conditions, "_tested", tested)
+    # Neither is seen beside the other.
+    monkeypatch.setattr(campaign_conditions, "_beside", lambda *_: None)
+    behind["current"] = 1.0
+    judged = judge_conditions(both, {"a": 0, "b": 1, "c": 2}, no_progress)
+    assert [(one.effect, one.unresolved) for one in judged.tests] == [("wind", ("current",)), ("current", ("wind",))]
+    assert judged.hull.fit.campaign.conditions == ()
+    (claim,) = judged.claims("a")
+    assert not claim.finding.sure
+    assert claim.finding.unresolved_with == ("current",)
+    assert "a current explains about as much" in claim.finding.says
+    behind["current"] = 30.0
+    judged = judge_conditions(both, {"a": 0, "b": 1, "c": 2}, no_progress)
+    assert [(one.effect, one.confirmed) for one in judged.tests] == [("wind", True)]
+
+
+def test_references_that_measured_what_a_log_did_not_have_no_conditions() -> None:
+    first, second, third = campaign(conditions=("wind", "current")).members
+    measured = replace(second, conditions=(CURRENT,))
+    kept = _conditions_of_logs([first, measured, third], [False, True, True])
+    assert [one.conditions for one in kept] == [first.conditions, (), third.conditions]
+    # A log of the campaign keeps what it has.
+    assert _conditions_of_logs([first, measured], [False, False]) == [first, measured]
+    # References that miss nothing of what logs may have keep theirs.
+    assert _conditions_of_logs([measured, third], [False, True]) == [measured, third]
 
 
 def test_like_headings_make_no_placebo() -> None:
