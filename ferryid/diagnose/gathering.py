@@ -78,30 +78,62 @@ def gather(
             errors[path] = error
     if not found:
         raise next(iter(errors.values()))
-    artificial = {one.path: why for one in found if (why := simulated(one.screened.measured))}
     whose = "references" if references else "campaign"
-    # A contradiction is between a log and its profile, and may be the profile's fault.
     notes = [
         f"Left out of the {whose}: {error if Path(path).stem in str(error) else f'{path}: {error}'}"
         for path, error in errors.items()
     ]
-    if 0 < len(artificial) < len(found):
-        found = [one for one in found if one.path not in artificial]
-        notes += [
-            f"Left out of the {whose}: {path}: it is simulated among recorded logs, {why}. Fix: diagnose simulated logs by "
-            "themselves"
-            for path, why in artificial.items()
-        ]
-    elif artificial:
-        notes += [
+    kept, why = sort_out(found, whose)
+    return Gathered(tuple(kept), (*notes, *why, *_clocks(kept)))
+
+
+def sort_out(logs: Sequence[AveragedLog], whose: str) -> tuple[list[AveragedLog], list[str]]:
+    """Return logs without simulated ones and ones that contradict themselves, where others do not, and a sentence on each.
+
+    `whose` are they: what they are left out of.
+    """
+    artificial = {one.path: why for one in logs if (why := simulated(one.screened.measured))}
+    if artificial and len(artificial) == len(logs):
+        return list(logs), [
             f"{path} is no recording of a vessel: {why}. What is found in it is the simulator's."
             for path, why in artificial.items()
         ]
-    return Gathered(tuple(found), (*notes, *_clocks(found)))
+    notes = [
+        f"Left out of the {whose}: {path}: it is simulated among recorded logs, {why}. Fix: diagnose simulated logs by "
+        "themselves"
+        for path, why in artificial.items()
+    ]
+    kept = [one for one in logs if one.path not in artificial]
+    wrong = {one.path: " ".join(why) for one in kept if (why := one.screened.measured.survey.contradictions)}
+    # What half of the logs show is the profile's fault, and not theirs.
+    if 2 * len(wrong) >= len(kept):
+        return kept, notes
+    notes += [
+        f"Left out of the {whose}: {path}: its signals contradict each other, and those of the other logs do not. {why} "
+        "Fix: correct what changed in this log, or give it a profile of its own"
+        for path, why in wrong.items()
+    ]
+    return [one for one in kept if one.path not in wrong], notes
 
 
 def _clocks(logs: Sequence[AveragedLog]) -> tuple[str, ...]:
-    """Return a sentence on logs of one campaign whose times overlap, as a vessel cannot make two at once."""
+    """Return sentences on clocks that were not set in some logs, and on times that overlap, as a vessel cannot make two at once."""
+    unset = [one.path for one in logs if _start_ns(one) < CLOCK_SET_NS]
+    return (*(_unset(unset) if len(unset) < len(logs) else ()), *_overlapping(logs))
+
+
+def _unset(paths: Sequence[str]) -> tuple[str, ...]:
+    """Return a sentence on logs whose clocks were not set, those of others being dates."""
+    if not paths:
+        return ()
+    return (
+        f"The clock was not set in {listed([Path(one).name for one in paths])}, whose times are before the year 2000: when they "
+        "were recorded is not known, and all logs are taken in the order in which they were given.",
+    )
+
+
+def _overlapping(logs: Sequence[AveragedLog]) -> tuple[str, ...]:
+    """Return a sentence on logs whose times overlap."""
     copies = {path for path, _ in repeated(logs)}
     spans = sorted(
         (start, start + round(_seconds(one) * 1e9), one.path)

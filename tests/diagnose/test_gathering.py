@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from ferryid.diagnose.gathering import Gathered, gather, part, without_logs
+from ferryid.diagnose import gathering
+from ferryid.diagnose.gathering import Gathered, _clocks, gather, part, sort_out, without_logs
 from ferryid.diagnose.inference.stages import AveragedLog
 from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.errors import FerryIdError
@@ -88,6 +89,47 @@ def test_times_that_overlap_are_noted(days: list[str], tmp_path: Path) -> None:
     assert note.startswith("The times of logs overlap")
     assert "run1.mcap and late.mcap by" in note
     assert gather(days[:2], FERRY, IN_MEMORY).notes == ()
+
+
+def doubtful(log: AveragedLog, **changed: object) -> AveragedLog:
+    """Return a log with something else known of it."""
+    measured = log.screened.measured
+    survey = replace(measured.survey, **changed)  # type: ignore[arg-type]
+    return replace(log, screened=replace(log.screened, measured=replace(measured, survey=survey)))
+
+
+def test_a_log_that_contradicts_itself_is_left_out_where_most_do_not(logs: tuple[AveragedLog, ...]) -> None:
+    wrong = doubtful(logs[2], contradictions=("The surge velocity has the wrong sign.",))
+    kept, (note,) = sort_out([*logs[:2], wrong], "campaign")
+    assert kept == list(logs[:2])
+    assert note.startswith(f"Left out of the campaign: {wrong.path}: its signals contradict each other")
+    assert "The surge velocity has the wrong sign. Fix:" in note
+    # Of two logs, nobody knows which is right.
+    assert sort_out([logs[0], wrong], "campaign") == ([logs[0], wrong], [])
+
+
+def test_a_clock_that_was_not_set_is_noted(logs: tuple[AveragedLog, ...]) -> None:
+    early = doubtful(logs[1], t0_ns=5_000_000_000)
+    (note,) = _clocks([logs[0], early])
+    assert note.startswith("The clock was not set in run2.mcap")
+    assert _clocks([early]) == ()
+    assert _clocks(logs[:2]) == ()
+
+
+def test_simulated_logs_among_recorded_ones_are_left_out(
+    logs: tuple[AveragedLog, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    artificial = {logs[0].path}
+    monkeypatch.setattr(
+        gathering, "simulated", lambda measured: "it has no noise" if measured.path in artificial else ""
+    )
+    kept, (note,) = sort_out(logs[:2], "references")
+    assert kept == [logs[1]]
+    assert note.startswith(f"Left out of the references: {logs[0].path}: it is simulated among recorded logs")
+    artificial.add(logs[1].path)
+    kept, notes = sort_out(logs[:2], "campaign")
+    assert kept == list(logs[:2])
+    assert [one.split(": ")[0] for one in notes] == [f"{one.path} is no recording of a vessel" for one in logs[:2]]
 
 
 def test_references_that_are_logs_are_refused(logs: tuple[AveragedLog, ...]) -> None:

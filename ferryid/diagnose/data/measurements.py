@@ -57,6 +57,8 @@ class Survey:
         Absolute time of the measurements' first row [ns].
     repairs
         What was repaired while the log was read and aligned, as sentences.
+    contradictions
+        Those of the doubts by which it is certain that a signal is wrong.
     """
 
     recording: Recording
@@ -67,6 +69,7 @@ class Survey:
     t0_ns: int
     left_out: tuple[str, ...]
     repairs: tuple[str, ...] = ()
+    contradictions: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -156,7 +159,17 @@ def read_measurements(
     motion = replace(motion, left_out=(*measured.left_out, *placeless))
     said = left_out_sentences(recording, motion.left_out, measurements.usable)
     repairs = repair_sentences(recording, faults.taken_out)
-    survey = Survey(recording, motion, data_quality(recording, motion), doubts, hidden, track.t0_ns, said, repairs)
+    survey = Survey(
+        recording,
+        motion,
+        data_quality(recording, motion),
+        doubts,
+        hidden,
+        track.t0_ns,
+        said,
+        repairs,
+        tuple(doubt.says for doubt in track.doubts if doubt.certain),
+    )
     return measurements, survey
 
 
