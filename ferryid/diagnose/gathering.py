@@ -24,6 +24,8 @@ from ferryid.vessel.profile import Profile
 
 CLOCK_SET_NS = 946_684_800_000_000_000
 """Start of the year 2000: earlier times are no dates, but seconds since a log or a clock began."""
+OWN_HULLS = "The campaign is split: each side has a hull of its own, and a model is stored of the latest one."
+STAY = "They stay together here: what changed between them is in neither group's differences, and widens what is not known."
 SHOWN_OVERLAPS = 3
 """Pairs of overlapping logs that are listed; the others are counted."""
 
@@ -104,7 +106,8 @@ def sort_out(logs: Sequence[AveragedLog], whose: str) -> tuple[list[AveragedLog]
         for path, why in artificial.items()
     ]
     kept = [one for one in logs if one.path not in artificial]
-    wrong = {one.path: " ".join(why) for one in kept if (why := one.screened.measured.survey.contradictions)}
+    doubts = {one.path: one.screened.measured.survey.contradictions for one in kept}
+    wrong = {path: " ".join(found) for path, found in doubts.items() if found}
     # What half of the logs show is the profile's fault, and not theirs.
     if 2 * len(wrong) >= len(kept):
         return kept, notes
@@ -117,7 +120,7 @@ def sort_out(logs: Sequence[AveragedLog], whose: str) -> tuple[list[AveragedLog]
 
 
 def _clocks(logs: Sequence[AveragedLog]) -> tuple[str, ...]:
-    """Return sentences on clocks that were not set in some logs, and on times that overlap, as a vessel cannot make two at once."""
+    """Return sentences on clocks that some logs did not set, and on times that overlap: no vessel makes two logs at once."""
     unset = [one.path for one in logs if _start_ns(one) < CLOCK_SET_NS]
     return (*(_unset(unset) if len(unset) < len(logs) else ()), *_overlapping(logs))
 
@@ -127,8 +130,8 @@ def _unset(paths: Sequence[str]) -> tuple[str, ...]:
     if not paths:
         return ()
     return (
-        f"The clock was not set in {listed([Path(one).name for one in paths])}, whose times are before the year 2000: when they "
-        "were recorded is not known, and all logs are taken in the order in which they were given.",
+        f"The clock was not set in {listed([Path(one).name for one in paths])}, whose times are before the year 2000: when "
+        "they were recorded is not known, and all logs are taken in the order in which they were given.",
     )
 
 
@@ -180,8 +183,16 @@ def without_logs(references: Gathered, logs: Sequence[AveragedLog]) -> Gathered:
 
 def part(gathered: Gathered, references: Gathered, profile: Profile, model: Model | None) -> tuple[Group, ...]:
     """Return the logs in groups of one hull each, the latest last; one group where a common hull fits all."""
-    whole = Group(gathered.logs, references.logs, (*gathered.notes, *references.notes))
-    open_groups, closed = [whole], list[Group]()
+    groups = _parts(gathered, references, profile, model)
+    if len(groups) == 1:
+        return groups
+    return tuple(replace(one, notes=(*one.notes, OWN_HULLS)) for one in groups)
+
+
+def _parts(gathered: Gathered, references: Gathered, profile: Profile, model: Model | None) -> tuple[Group, ...]:
+    """Return the same without a word on what is made of them."""
+    every = Group(gathered.logs, references.logs, (*gathered.notes, *references.notes))
+    open_groups, closed = [every], list[Group]()
     while open_groups:
         group = open_groups.pop()
         parts = _parted(group, profile, model)
@@ -191,6 +202,16 @@ def part(gathered: Gathered, references: Gathered, profile: Profile, model: Mode
             open_groups += parts
     order = [id(one) for one in _in_time(gathered.logs)]
     return tuple(sorted(closed, key=lambda group: max(order.index(id(one)) for one in group.logs)))
+
+
+def whole(gathered: Gathered, profile: Profile, model: Model | None) -> Gathered:
+    """Return logs that are compared as one group, without one that no common hull fits; more of them stay, with a note."""
+    groups = _parts(gathered, Gathered(()), profile, model)
+    if len(groups) == 1:
+        return Gathered(groups[0].logs, groups[0].notes)
+    left = {one.path for group in groups for one in group.logs}
+    kept = tuple(one for one in gathered.logs if one.path in left)
+    return Gathered(kept, (*dict.fromkeys(note for group in groups for note in group.notes), STAY))
 
 
 def _in_time(logs: Sequence[AveragedLog]) -> list[AveragedLog]:
@@ -269,9 +290,8 @@ def _halves(group: Group, inside: set[str], outside: set[str], split: Split) -> 
     parts = [tuple(one for one, here in zip(group.logs, chosen, strict=True) if here == side) for side in (True, False)]
     first, second = (_names(group, {one.path for one in logs}) for logs in parts)
     note = (
-        f"The campaign is split in two: no common hull fits {first} on one side and {second} on the other ({_why(split)}). The "
-        "hull or the load changed between them, or one side is of another vessel. Each side has a hull of its own; a model is "
-        "stored of the later one."
+        f"No common hull fits {first} on one side and {second} on the other ({_why(split)}). The hull or the load changed "
+        "between them, or one side is of another vessel."
     )
     return [
         Group(logs, tuple(one for one in group.references if one.path in side), (*group.notes, note))

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from ferryid.diagnose import gathering
-from ferryid.diagnose.gathering import Gathered, _clocks, gather, part, sort_out, without_logs
+from ferryid.diagnose.gathering import Gathered, _clocks, gather, part, sort_out, whole, without_logs
 from ferryid.diagnose.inference.stages import AveragedLog
 from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.errors import FerryIdError
@@ -57,9 +57,23 @@ def test_a_campaign_is_split_where_the_hull_changed(days: list[str], logs: tuple
     groups = part(Gathered((*logs[2:], *logs[:2])), Gathered(()), FERRY, None)
     assert [paths(one.logs) for one in groups] == [days[:2], days[2:]]
     for group in groups:
-        (note,) = group.notes
-        assert note.startswith("The campaign is split in two: no common hull fits")
+        note, split = group.notes
+        assert note.startswith("No common hull fits")
+        assert split.startswith("The campaign is split: each side has a hull of its own")
         assert "day1/run1.mcap and day1/run2.mcap" in note
+
+
+def test_logs_that_are_compared_as_one_group_stay_together_but_for_a_single_one(
+    days: list[str], logs: tuple[AveragedLog, ...]
+) -> None:
+    both = whole(Gathered(logs), FERRY, None)
+    assert paths(both.logs) == days
+    note, stay = both.notes
+    assert note.startswith("No common hull fits day1/run1.mcap and day1/run2.mcap on one side")
+    assert stay.startswith("They stay together here")
+    rest = whole(Gathered(logs[:3]), FERRY, None)
+    assert paths(rest.logs) == days[:2]
+    assert len(rest.notes) == 1
 
 
 def test_a_log_of_another_vessel_is_left_out(days: list[str], logs: tuple[AveragedLog, ...]) -> None:
