@@ -30,6 +30,7 @@ def render(
     """Return the page on one log or several, and its drawings (SVG) by name; `made` are date, version and command."""
     several = len(diagnoses) > 1
     shared = diagnosis_words.notes_of_all(diagnoses)
+    gathered = [note for note in shared if note in diagnoses[0].gathered]
     common = diagnosis_words.findings_of_all(diagnoses)
     together = second_sources.of_all(diagnoses)
     logs = [_log(one, f"{k}-" if several else "", k <= MAX_LOGS, shared, common) for k, one in enumerate(diagnoses, 1)]
@@ -45,7 +46,8 @@ def render(
         likeness=of_all,
         sign=diagnosis_words.SIGN,
         made=made,
-        shared_notes=shared,
+        gathered=gathered,
+        shared_notes=[note for note in shared if note not in gathered],
         shared_sources=second_sources.section(together) if together else {},
         shared_model=diagnosis_words.model_of_all(diagnoses),
         axes=list(zip(AXES, UNITS, strict=True)),

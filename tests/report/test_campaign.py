@@ -53,5 +53,15 @@ def test_the_model_of_all_logs_stands_once(tmp_path: Path) -> None:
     assert page.index("ferry@3") < page.index('id="log-1"')
 
 
+def test_which_logs_take_part_stands_before_all_logs(tmp_path: Path) -> None:
+    split, rest = "No common hull fits a on one side and b on the other.", "Current of each log: not confirmed."
+    several = [replace(one, notes=(split, rest), gathered=(split,)) for one in campaign()]
+    page = report(several, tmp_path).report.read_text(encoding="utf-8")
+    assert page.count(split) == page.count(rest) == 1
+    assert page.index("<h2>Which logs take part</h2>") < page.index(split) < page.index('id="log-1"')
+    assert page.index(rest) > page.index("Of all logs")
+    assert "Which logs take part" not in report(campaign(), tmp_path).report.read_text(encoding="utf-8")
+
+
 def test_a_single_log_shares_nothing() -> None:
     assert "In all logs" not in as_text(campaign()[:1])

@@ -61,7 +61,7 @@ def conclude(
     together
         What the logs of a campaign say together; None of one log.
     left_out
-        Why other logs of it could not be used, as sentences.
+        Why other logs of it could not be used, and what else there is to know of which take part, as sentences.
     """
     by_path = {one.selected.path: one for one in judged}
     claims = {
@@ -89,7 +89,7 @@ def conclude(
         for one in logs
     )
     return tuple(
-        replace(one, likeness=single.get(log.path), likeness_of_all=of_all)
+        replace(one, likeness=single.get(log.path), likeness_of_all=of_all, gathered=left_out)
         for one, log in zip(found, logs, strict=True)
     )
 

@@ -123,6 +123,8 @@ class Diagnosis:
         What was repaired of the log while it was read, as sentences.
     sources
         What topics that the profile does not map show of the sensors; of a campaign, over all logs.
+    gathered
+        Those of the notes that are about which logs of a campaign take part, and in which groups.
     latest
         False for a log of an earlier hull than the one that a model is stored of, where no common hull fits a campaign.
     """
@@ -151,6 +153,7 @@ class Diagnosis:
     likeness_of_all: Likeness | None = None
     repairs: tuple[str, ...] = ()
     sources: SecondSources = field(default_factory=SecondSources)
+    gathered: tuple[str, ...] = ()
     latest: bool = True
 
 
