@@ -286,8 +286,8 @@ def diagnose(
     model
         The model to examine: path, name or name@version; the profile's hull where None.
     settings
-        Against a simulated log, every log by itself, signals to withhold, references: `ferryid.diagnose.DiagnosisSettings`. Its model
-        is `model`.
+        Against a simulated log, every log by itself, signals to withhold, references: `ferryid.diagnose.DiagnosisSettings`.
+        Its model is `model`.
     name
         Name of the model with the findings.
     command
