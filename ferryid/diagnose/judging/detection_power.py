@@ -53,10 +53,11 @@ class DetectionPower:
 def detection_powers(problem: EstimationProblem, kept: Fit, library: Sequence[Candidate]) -> tuple[DetectionPower, ...]:
     """Return the chance of finding each candidate, beside what was found.
 
-    With d the change of the whitened prediction errors that the effect makes at its usual size, less what hull and findings
-    can imitate, and S the information on its parameters, the logarithm of the evidence is normal about ``½ d'd - ½ z'z - ½ log
-    det(1 + S)`` with a variance of ``d'd``; z are the parameters in their sizes. It has to exceed
-    `INFERENCE.prior_odds`. Of effects that may go either way the less visible one counts.
+    With d the change of the whitened prediction errors that the effect makes at its usual size, N what hull and findings do,
+    each within its prior, and S the information on the effect's parameters, all beside a prediction error of covariance ``I +
+    NN'``, the logarithm of the marginal evidence is normal about ``½ d'(I + NN')⁻¹d - ½ z'z - ½ log det(I + S)`` with a variance
+    of ``d'(I + NN')⁻¹d``; z are the parameters in their sizes. It has to exceed `INFERENCE.prior_odds`. Of effects that may go
+    either way the less visible one counts.
 
     Parameters
     ----------
@@ -71,6 +72,7 @@ def detection_powers(problem: EstimationProblem, kept: Fit, library: Sequence[Ca
     inner = nuisance.T @ nuisance + np.eye(nuisance.shape[1])
 
     def apart(columns: Floats) -> Floats:
+        # (I + NN')⁻¹ of the columns: hull and findings are not known, so that what they can imitate is worth less.
         return np.asarray(columns - nuisance @ np.linalg.solve(inner, nuisance.T @ columns))
 
     taken = {one.key for one in kept.candidates}
@@ -82,7 +84,7 @@ def detection_powers(problem: EstimationProblem, kept: Fit, library: Sequence[Ca
         chance = 1.0
         for usual in _usual(candidate):
             there = problem.white(candidate.act(force_model, usual))
-            change = apart(there - before)
+            change = there - before
             if not change.any():
                 # Of what comes and goes by chance a force model holds no force: it is found in the noise, and not here.
                 break
@@ -92,7 +94,7 @@ def detection_powers(problem: EstimationProblem, kept: Fit, library: Sequence[Ca
                 for step in np.diag(size)
             ]
             information = np.column_stack(columns).T @ apart(np.column_stack(columns))
-            strength = float(change @ change)
+            strength = float(change @ apart(change))
             occam = float(np.linalg.slogdet(np.eye(len(size)) + information)[1])
             evidence = 0.5 * (strength - len(size) - occam)
             chance = min(chance, 0.5 * (1.0 + erf((evidence - INFERENCE.prior_odds) / sqrt(2.0 * max(strength, 1.0)))))

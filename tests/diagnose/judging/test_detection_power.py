@@ -9,6 +9,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit
 from ferryid.diagnose.inference.thresholds import INFERENCE
@@ -78,6 +79,23 @@ def test_a_chance_is_how_often_the_evidence_is_enough() -> None:
     y = x + random.standard_normal((20000, ROWS))
     evidence = 0.5 * (y @ x) ** 2 / (1.0 + information) - 0.5 * np.log1p(information)
     assert chance(linear(strength)) == pytest.approx(float(np.mean(evidence > INFERENCE.prior_odds)), abs=0.03)
+
+
+@pytest.mark.parametrize("strength", [0.1, 0.14, 0.2])
+def test_a_chance_beside_an_unknown_hull_is_how_often_the_evidence_is_enough(strength: float) -> None:
+    # The hull can imitate the push, as far as its prior lets it.
+    random = np.random.default_rng(5)
+    x = np.full(ROWS, 10.0 * strength)
+    hull = np.zeros((ROWS, len(COEFFICIENTS)))
+    hull[:, 0] = 0.2
+    covariance = np.eye(ROWS) + hull @ hull.T
+    y = x + random.multivariate_normal(np.zeros(ROWS), covariance, 20000)
+    # By the densities themselves: with the push, whose size is normal, against without it.
+    with_push = multivariate_normal(np.zeros(ROWS), covariance + np.outer(x, x)).logpdf(y)
+    evidence = with_push - multivariate_normal(np.zeros(ROWS), covariance).logpdf(y)
+    enough = float(np.mean(evidence > INFERENCE.prior_odds))
+    assert 0.05 < enough
+    assert chance(linear(strength, hull)) == pytest.approx(enough, abs=0.04)
 
 
 def test_what_the_hull_can_imitate_is_not_seen() -> None:
