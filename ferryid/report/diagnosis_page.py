@@ -12,7 +12,16 @@ import numpy as np
 from ferryid.counts import counted
 from ferryid.diagnose import Diagnosis, Finding, Withheld, campaign_verdict
 from ferryid.models.prediction import FreeRun
-from ferryid.report import diagnosis_errors, diagnosis_figures, diagnosis_words, figures, likeness, second_sources
+from ferryid.report import (
+    campaign,
+    diagnosis_errors,
+    diagnosis_figures,
+    diagnosis_words,
+    figures,
+    likeness,
+    second_sources,
+)
+from ferryid.report.campaign import TEXT_COLUMNS
 from ferryid.report.html import template
 from ferryid.report.left_out import left_out_table
 from ferryid.signals.track import LeftOut
@@ -20,7 +29,6 @@ from ferryid.types import AXES, Floats
 
 MAX_LOGS = 6
 """Logs whose evidence is drawn; the page stays readable."""
-TEXT_COLUMNS = 100
 UNITS = ("[N]", "[N]", "[N·m]")
 
 
@@ -35,12 +43,14 @@ def render(
     together = second_sources.of_all(diagnoses)
     logs = [_log(one, f"{k}-" if several else "", k <= MAX_LOGS, shared, common) for k, one in enumerate(diagnoses, 1)]
     left = [one.log for one in diagnoses[MAX_LOGS:]]
+    of_campaign = campaign.section(diagnoses) if several else {}
     of_all = likeness.section(diagnoses[0].likeness_of_all, "likeness", "these logs together")
     page = template("diagnosis.html").render(
         title=title,
         verdict=campaign_verdict([one.verdict for one in diagnoses]),
         headline=diagnosis_words.summary(diagnoses),
         several=several,
+        campaign=of_campaign,
         logs=logs,
         common=[_finding(one, f"all-finding-{k}", False, ()) for k, one in enumerate(common, 1)],
         likeness=of_all,
@@ -63,50 +73,61 @@ def render(
             *log["likeness"].get("figures", ()),
         )
     }
-    drawings |= {figure["file"]: figure["svg"] for figure in of_all.get("figures", ())}
+    together_drawn = [
+        *of_all.get("figures", ()),
+        *(one for flow in of_campaign.get("flows", ()) for one in flow["figures"]),
+    ]
+    drawings |= {figure["file"]: figure["svg"] for figure in together_drawn}
     return page, drawings
 
 
 def as_text(diagnoses: Sequence[Diagnosis]) -> str:
-    """Return the same for a terminal, short."""
-    blocks = [diagnosis_words.summary(diagnoses)] if len(diagnoses) > 1 else []
+    """Return the same for a terminal, short: of several logs what they have in common, as tables."""
+    return _one_as_text(diagnoses[0]) if len(diagnoses) == 1 else _several_as_text(diagnoses)
+
+
+def _several_as_text(diagnoses: Sequence[Diagnosis]) -> str:
+    blocks = [_folded(diagnosis_words.summary(diagnoses))]
     shared = diagnosis_words.notes_of_all(diagnoses)
     common = diagnosis_words.findings_of_all(diagnoses)
     together = second_sources.of_all(diagnoses)
     if common:
         lines = ["In all logs:", *_listed(common)]
         blocks.append("\n".join(_folded(line) for line in lines))
-    for one in diagnoses:
-        lines = [f"{one.log}: {diagnosis_words.headline(one)}", *_listed(diagnosis_words.findings_of(one, common))]
-        rows = diagnosis_errors.force_rows(one)
-        if rows:
-            lines += ["", f"{'on held-out data':<44}" + "".join(f"{axis:>22}" for axis in AXES)]
-            lines.append(f"{'':<44}" + "".join(f"{unit:>22}" for unit in UNITS))
-            lines += [f"{row['name']:<44}" + "".join(f"{cell:>22}" for cell in row["cells"]) for row in rows]
-            lines += diagnosis_words.about_errors(one)
-        runs = diagnosis_errors.free_run_rows(one)
-        if runs:
-            names = ("without", "with", "with over without") if diagnosis_errors.fitted(one) else ("error",)
-            lines += ["", f"{'free run on held-out data':<44}" + "".join(f"{name:>22}" for name in names)]
-            for row in runs:
-                lines.append(f"{row['name']:<44}" + "".join(f"{cell:>22}" for cell in row["cells"][: len(names)]))
-        hidden = [f"withheld {one_hidden.signal}: {one_hidden.says}" for one_hidden in one.withheld]
-        remarks = [*hidden, *(f"note: {note}" for note in diagnosis_words.notes_of(one, shared))]
-        if one.likeness_of_all is None:
-            remarks += [f"note: {note}" for note in likeness.notes(one.likeness, "this log")]
-        remarks += [] if together else second_sources.lines(one.sources)
-        remarks += second_sources.repair_lines(one)
-        lines += ["", *remarks] if remarks else []
-        lines += ["", diagnosis_words.new_model(one)] if one.model and len(diagnoses) == 1 else [""]
-        blocks.append("\n".join(_folded(line) for line in lines))
+    blocks += campaign.text_tables(diagnoses)
     about_all = [*shared, *likeness.notes(diagnoses[0].likeness_of_all, "these logs together")]
     if about_all:
-        blocks.append("\n".join(_folded(f"note on all logs: {note}") for note in about_all))
+        blocks.append("\n".join(_folded(f"note: {note}") for note in about_all))
     if together and (instruments := second_sources.lines(together)):
         blocks.append("\n".join(_folded(line) for line in instruments))
+    blocks.append(_folded(campaign.left_to_the_page(diagnoses, shared)))
     if model := diagnosis_words.model_of_all(diagnoses):
         blocks.append(_folded(model))
     return "\n\n".join(blocks)
+
+
+def _one_as_text(one: Diagnosis) -> str:
+    lines = [f"{one.log}: {diagnosis_words.headline(one)}", *_listed(one.findings)]
+    rows = diagnosis_errors.force_rows(one)
+    if rows:
+        lines += ["", f"{'on held-out data':<44}" + "".join(f"{axis:>22}" for axis in AXES)]
+        lines.append(f"{'':<44}" + "".join(f"{unit:>22}" for unit in UNITS))
+        lines += [f"{row['name']:<44}" + "".join(f"{cell:>22}" for cell in row["cells"]) for row in rows]
+        lines += diagnosis_words.about_errors(one)
+    runs = diagnosis_errors.free_run_rows(one)
+    if runs:
+        names = ("without", "with", "with over without") if diagnosis_errors.fitted(one) else ("error",)
+        lines += ["", f"{'free run on held-out data':<44}" + "".join(f"{name:>22}" for name in names)]
+        for row in runs:
+            lines.append(f"{row['name']:<44}" + "".join(f"{cell:>22}" for cell in row["cells"][: len(names)]))
+    hidden = [f"withheld {one_hidden.signal}: {one_hidden.says}" for one_hidden in one.withheld]
+    remarks = [*hidden, *(f"note: {note}" for note in diagnosis_words.notes_of(one))]
+    if one.likeness_of_all is None:
+        remarks += [f"note: {note}" for note in likeness.notes(one.likeness, "this log")]
+    remarks += [*second_sources.lines(one.sources), *second_sources.repair_lines(one)]
+    lines += ["", *remarks] if remarks else []
+    lines += ["", diagnosis_words.new_model(one)] if one.model else [""]
+    return "\n".join(_folded(line) for line in lines)
 
 
 def _listed(findings: Sequence[Finding]) -> list[str]:
@@ -156,7 +177,7 @@ def _log(
             for k, one in enumerate(diagnosis_words.findings_of(diagnosis, common), 1)
         ],
         "left_out": left_out_table(diagnosis.left_out),
-        "names": [diagnosis_words.title(one.effect, one.instance) for one in diagnosis.findings],
+        "names": campaign.names_of(diagnosis),
         "force_rows": force_rows,
         "free_run_rows": free_run_rows,
         "free_run_figures": _free_run_figures(diagnosis, prefix) if drawn else [],

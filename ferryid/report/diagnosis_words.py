@@ -115,23 +115,32 @@ def said(finding: Finding) -> str:
 
 
 def numbers(finding: Finding) -> str:
-    """Return the parameters with intervals and units."""
-    parts = [f"{_word(name)} {estimate(one)}" for name, one in finding.parameters.items()]
-    told = "; ".join(parts)
+    """Return the parameters with intervals and units, as a sentence."""
+    told = numbers_of(finding.parameters)
     return (
-        f"{told if next(iter(finding.parameters)) in COEFFICIENTS else _upper(told)} (95 % intervals)." if parts else ""
+        f"{told if next(iter(finding.parameters)) in COEFFICIENTS else _upper(told)} (95 % intervals)." if told else ""
     )
+
+
+def numbers_of(parameters: Mapping[str, Estimate]) -> str:
+    """Return parameters with intervals and units, one after the other."""
+    return "; ".join(f"{word(name)} {estimate(one)}" for name, one in parameters.items())
 
 
 def estimate(one: Estimate) -> str:
     """Return a value with its interval and unit, to the digits that the interval supports."""
-    width = one.high - one.low
-    digits = min(max(1 - _exponent(width), 0), 6) if isfinite(width) and width > 0.0 else 3
+    width, digits = one.high - one.low, digits_of(one)
     unit = "" if one.unit in ("-", "") else f" {one.unit}"
     value = f"{one.value:.{digits}f}{unit}"
     if not isfinite(width):
         return value
     return f"{value} ({one.low:.{digits}f} to {one.high:.{digits}f})"
+
+
+def digits_of(one: Estimate) -> int:
+    """Return the decimals of a value that its interval supports."""
+    width = one.high - one.low
+    return min(max(1 - _exponent(width), 0), 6) if isfinite(width) and width > 0.0 else 3
 
 
 def measured(value: float | None, unit: str) -> str:
@@ -355,7 +364,8 @@ def _odds(delta: float) -> str:
     return f"is {float(f'{exp(-delta):.2g}'):,.0f} times less likely".replace(",", " ")
 
 
-def _word(name: str) -> str:
+def word(name: str) -> str:
+    """Return the name of a parameter for people."""
     return name if name in COEFFICIENTS else NAMES.get(name, name.replace("_", " "))
 
 

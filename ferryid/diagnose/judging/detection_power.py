@@ -54,10 +54,10 @@ def detection_powers(problem: EstimationProblem, kept: Fit, library: Sequence[Ca
     """Return the chance of finding each candidate, beside what was found.
 
     With d the change of the whitened prediction errors that the effect makes at its usual size, N what hull and findings do,
-    each within its prior, and S the information on the effect's parameters, all beside a prediction error of covariance ``I +
-    NN'``, the logarithm of the marginal evidence is normal about ``½ d'(I + NN')⁻¹d - ½ z'z - ½ log det(I + S)`` with a variance
-    of ``d'(I + NN')⁻¹d``; z are the parameters in their sizes. It has to exceed `INFERENCE.prior_odds`. Of effects that may go
-    either way the less visible one counts.
+    each within its prior, and S the information on the effect's parameters beside a prediction error of covariance ``C = I +
+    NN'``, the logarithm of the marginal evidence is normal about ``½ d'C⁻¹d - ½ z'z - ½ log det(I + S)`` with a variance of
+    ``d'C⁻¹d``; z are the parameters in their sizes. It has to exceed `INFERENCE.prior_odds`. Of effects that may go either way
+    the less visible one counts.
 
     Parameters
     ----------

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from math import isfinite
+from math import atan2, degrees, hypot, isfinite
 from pathlib import PurePath
 from typing import Any
 
@@ -58,6 +58,25 @@ class Withheld:
     measured: Mapping[str, float]
     says: str
     course: MeasuredCourse | None = None
+
+    @property
+    def off(self) -> tuple[float, float] | None:
+        """How far a flow that was found points away from the measured one [deg], and its strength over that.
+
+        None where either is missing, or nothing flowed.
+        """
+        return flow_off({name: one.value for name, one in self.found.items()}, self.measured)
+
+
+def flow_off(found: Mapping[str, float], measured: Mapping[str, float]) -> tuple[float, float] | None:
+    """Return by how many degrees a flow points away from another, and its strength over that; None where one is missing."""
+    if not all(name in one for name in ("north", "east") for one in (found, measured)):
+        return None
+    strength = hypot(measured["north"], measured["east"])
+    if strength == 0.0:
+        return None
+    apart = degrees(atan2(found["east"], found["north"]) - atan2(measured["east"], measured["north"]))
+    return abs((apart + 180.0) % 360.0 - 180.0), hypot(found["north"], found["east"]) / strength
 
 
 @dataclass(frozen=True)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import atan2, degrees, hypot
 
 import numpy as np
 
 from ferryid.diagnose.data.course import MeasuredCourse
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.data.payload import aboard
-from ferryid.diagnose.judging.diagnosis import Withheld
+from ferryid.diagnose.judging.diagnosis import Withheld, flow_off
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.effects import effects
 from ferryid.effects.force_model import Measurements
@@ -66,18 +65,12 @@ def _beside(signal: str, values: Floats, measurements: Measurements, findings: S
 
 def _compared(found: Mapping[str, Estimate], measured: Mapping[str, float]) -> str:
     """Return how far a flow points away from the measured one, and its strength over it, as the end of a sentence."""
-    if not all(name in one for name in ("north", "east") for one in (found, measured)):
+    off = flow_off({name: one.value for name, one in found.items()}, measured)
+    if off is None:
         return ""
-    north, east = found["north"].value, found["east"].value
-    strength = hypot(measured["north"], measured["east"])
-    if strength == 0.0:
-        return ""
-    apart = degrees(atan2(east, north) - atan2(measured["east"], measured["north"]))
-    off = abs((apart + 180.0) % 360.0 - 180.0)
     inside = sum(found[name].low <= measured[name] <= found[name].high for name in ("north", "east"))
     held = {0: "neither", 1: "one", 2: "both"}[inside]
-    ratio = hypot(north, east) / strength
-    return f", {off:.0f} degrees off at {ratio:.2f} of its strength; intervals hold {held} of the components"
+    return f", {off[0]:.0f} degrees off at {off[1]:.2f} of its strength; intervals hold {held} of the components"
 
 
 def _says(name: str, value: float, units: Mapping[str, str]) -> str:
