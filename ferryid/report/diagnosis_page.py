@@ -100,7 +100,11 @@ def _several_as_text(diagnoses: Sequence[Diagnosis]) -> str:
         blocks.append("\n".join(_folded(f"note: {note}") for note in about_all))
     if together and (instruments := second_sources.lines(together)):
         blocks.append("\n".join(_folded(line) for line in instruments))
-    blocks.append(_folded(campaign.left_to_the_page(diagnoses, shared)))
+    unused = [one for one in diagnoses if one.verdict == "not_testable"]
+    if why := [f"{one.log}: {note}" for one in unused for note in diagnosis_words.notes_of(one, shared)]:
+        blocks.append("\n".join(_folded(line) for line in why))
+    tested = [one for one in diagnoses if one not in unused]
+    blocks.append(_folded(campaign.left_to_the_page(tested, shared)))
     if model := diagnosis_words.model_of_all(diagnoses):
         blocks.append(_folded(model))
     return "\n\n".join(blocks)

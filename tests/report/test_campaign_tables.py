@@ -118,6 +118,13 @@ def test_a_terminal_shows_tables_within_its_width_and_leaves_each_log_to_the_pag
     assert "\N{NO-BREAK SPACE}" not in text
 
 
+def test_a_log_that_could_not_be_used_has_its_reason_on_the_terminal() -> None:
+    copy = replace(log("copy"), verdict="not_testable", notes=("It is the same recording.",))
+    text = as_text([*three(), copy])
+    assert "copy: It is the same recording." in text
+    assert "with 1 note" not in text
+
+
 @pytest.mark.slow
 def test_the_page_draws_the_wind_of_each_log_once() -> None:
     page, drawings = render(three(), "trials")
