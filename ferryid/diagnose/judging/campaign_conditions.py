@@ -96,6 +96,8 @@ class ConditionTest:
         Conditions that cannot be true, by the headings that they stand on.
     unresolved
         Other conditions that held-out data confirm as well in its place, and that are hardly less likely.
+    outdone
+        Other conditions that cannot be true, as they stand on headings that the vessel did not have, and have more evidence.
     """
 
     effect: str
@@ -106,6 +108,7 @@ class ConditionTest:
     gain: Gain
     placebos: Mapping[str, PlaceboTest]
     unresolved: tuple[str, ...] = ()
+    outdone: tuple[str, ...] = ()
 
     @cached_property
     def courses(self) -> tuple[Course, ...]:
@@ -126,7 +129,7 @@ class ConditionTest:
     def estimated(self) -> bool:
         """True where the evidence speaks for it, against placebos too, confirmed or not."""
         against = all(one.own for one in self.placebos.values())
-        return self.evidence >= INFERENCE.prior_odds and against and bool(self.placebos)
+        return self.evidence >= INFERENCE.prior_odds and against and bool(self.placebos) and not self.outdone
 
     @property
     def doubt(self) -> str:
@@ -140,6 +143,8 @@ class ConditionTest:
         for place, placebo in self.placebos.items():
             if not placebo.beaten:
                 return f"one on {place}, which cannot be true, explains about as much"
+        if self.outdone:
+            return f"a {listed(self.outdone, 'or')}, which cannot be true, explains more"
         if self.unresolved:
             return f"a {listed([effects()[one].title.lower() for one in self.unresolved])} explains about as much"
         return ""
@@ -184,6 +189,7 @@ def judge_conditions(campaign: Campaign, place: Mapping[str, int], progress: Cal
     for name in names:
         progress(f"estimating one hull and a {effects()[name].title.lower()} of every log")
         tests.append(_tested(with_conditions(campaign, frozenset([name])), progress))
+    tests = [_against_others(one, campaign, progress) if one.confirmed else one for one in tests]
     tests.sort(key=lambda one: -one.evidence)
     confirmed = [one for one in tests if one.confirmed]
     if not confirmed:
@@ -231,6 +237,21 @@ def _tested(campaign: Campaign, progress: Callable[[str], None]) -> ConditionTes
             share = 0.0 if campaign.hull.known else (other.evidence - none.evidence) / evidence
             against[name] = PlaceboTest(Gain.of(over), made.evidence - other.evidence, share)
     return ConditionTest(campaign.conditions[0].effect.id, made, none, loss, evidence, Gain.of(gains), against)
+
+
+def _against_others(test: ConditionTest, campaign: Campaign, progress: Callable[[str], None]) -> ConditionTest:
+    """Return a test with the other conditions that explain more where they cannot be true.
+
+    What a condition leaves to explain, a force that no condition is, may look like another one turned round.
+    """
+    outdone = []
+    for name in sorted({one.effect.id for one in campaign.conditions} - {test.effect}):
+        title = effects()[name].title.lower()
+        progress(f"estimating a {title} on headings that the vessel did not have")
+        for where, placebo in placebos(with_conditions(campaign, frozenset([name]))).items():
+            if estimate_campaign(placebo, noise=test.fit.noise).evidence > test.fit.evidence:
+                outdone.append(f"{title} on {where}")
+    return replace(test, outdone=tuple(outdone))
 
 
 def _finding(test: ConditionTest, i: int, tests: tuple[ConditionTest, ...]) -> Finding | None:
