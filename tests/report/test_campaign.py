@@ -59,7 +59,7 @@ def test_which_logs_take_part_stands_before_all_logs(tmp_path: Path) -> None:
     page = report(several, tmp_path).report.read_text(encoding="utf-8")
     assert page.count(split) == page.count(rest) == 1
     assert page.index("<h2>Which logs take part</h2>") < page.index(split) < page.index('id="log-1"')
-    assert page.index(rest) > page.index("Of all logs")
+    assert page.index(rest) > page.index("Notes on all logs")
     assert "Which logs take part" not in report(campaign(), tmp_path).report.read_text(encoding="utf-8")
 
 
