@@ -170,7 +170,7 @@ def text_tables(diagnoses: Sequence[Diagnosis]) -> list[str]:
         if any("measured" in row for row in flows):
             head |= {"measured": "measured, withheld", "off": "apart"}
         if flows:
-            every = [[row.get(name, "") for name in head] for row in flows]
+            every = [[row.get(name, "–") for name in head] for row in flows]
             blocks.append(_aligned([list(head.values()), *([_short(row[0]), *row[1:]] for row in every)]))
     sentences = (*(withheld_summary(diagnoses, effect) for effect in FLOWS), error_sentence(diagnoses))
     return [*blocks, *(fill(line, TEXT_COLUMNS) for line in sentences if line)]
