@@ -124,6 +124,8 @@ class Effect:
         The thrusters that it can be an effect of; ``(None,)`` where it is one of the whole vessel.
     cannot
         Why the measurements cannot show it, as a sentence; empty where it can.
+    cannot_be_of
+        ``cannot_be_of(measurements, instance)`` returns why they cannot show it of one of its instances, in the same form.
     onset
         True where it may begin or end during the log.
     impulse
@@ -196,6 +198,7 @@ class Effect:
     scenario: Callable[[Values, str | None], dict[str, Any]]
     instances: Callable[[Profile], tuple[str | None, ...]] = lambda profile: (None,)
     cannot: Callable[[Measurements], str] = lambda measurements: ""
+    cannot_be_of: Callable[[Measurements, str | None], str] = lambda measurements, instance: ""
     onset: bool = False
     impulse: Callable[[ForceModel, Floats], Floats] | None = None
     vessel: bool = False
@@ -221,11 +224,23 @@ class Effect:
     simulated: Simulated | None = None
 
     def untestable(self, measurements: Measurements) -> str:
-        """Return why it is not looked for, as the end of a sentence; empty where it is."""
+        """Return why it is not looked for, as the end of a sentence; empty where it is, at least of one instance."""
+        if reason := self.excluded(measurements):
+            return reason
+        reasons = [self.cannot_be_of(measurements, one) for one in self.instances(measurements.profile)]
+        return reasons[0] if reasons and all(reasons) else ""
+
+    def excluded(self, measurements: Measurements) -> str:
+        """Return why vessel, setting and signals rule it out for any instance and whatever was done in a log."""
         setting = measurements.profile.setting
         if setting in self.absent_in:
             return f"the profile's setting is a {setting}"
         return self.cannot(measurements)
+
+    def testable_instances(self, measurements: Measurements) -> tuple[str | None, ...]:
+        """Return the instances of which the measurements can show it."""
+        every = () if self.excluded(measurements) else self.instances(measurements.profile)
+        return tuple(one for one in every if not self.cannot_be_of(measurements, one))
 
     def log_rarity(self, profile: Profile) -> float:
         """Return by how much its log prior odds are lower in the profile's setting than elsewhere [nat]."""

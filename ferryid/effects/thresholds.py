@@ -95,6 +95,19 @@ class EffectThresholds:
         "shorter delays of the navigation are void, intervals no narrower",
         "convention: a third of a period at 10 Hz",
     )
+    acting_share: float = threshold(
+        0.02,
+        "of the time",
+        "part of a log in which an actuator must run astern, near zero or far above it for its dead band, asymmetry or "
+        "saturation to be looked for",
+        "convention: a quarter of a minute in a log of 12 minutes",
+    )
+    acting_force: float = threshold(
+        0.05,
+        "of the actuator's largest force in the log",
+        "smaller forces count as neither ahead nor astern",
+        "convention: below the error of thrust curves",
+    )
     passing_gain: float = threshold(
         0.1,
         "of the thrust",

@@ -177,7 +177,7 @@ def _better(forces: OracleEstimate, kinematic: SensorEstimate | None) -> OracleE
 
 def _of_forces(log: _Log, truths: Sequence[Truth]) -> tuple[float, list[OracleEstimate]]:
     """Return the gain of some effects of force together, and what each makes of the log, added last."""
-    reasons = [log.too_short or effects()[truth.effect].cannot(log.measurements) for truth in truths]
+    reasons = [log.too_short or _cannot(log.measurements, truth) for truth in truths]
     made = [
         OracleEstimate(truth.effect, truth.instance, 0.0, 0, floor_of(1), {}, reason)
         for truth, reason in zip(truths, reasons, strict=True)
@@ -192,6 +192,11 @@ def _of_forces(log: _Log, truths: Sequence[Truth]) -> tuple[float, list[OracleEs
         floor = floor_of(one.free)
         made.append(OracleEstimate(truth.effect, truth.instance, one.gain, one.free, floor, parameters, idle=one.idle))
     return gain, made
+
+
+def _cannot(measurements: Measurements, truth: Truth) -> str:
+    effect = effects()[truth.effect]
+    return effect.cannot(measurements) or effect.cannot_be_of(measurements, truth.instance)
 
 
 def _suspect(profile: Profile, truth: Truth) -> Candidate:

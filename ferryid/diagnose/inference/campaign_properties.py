@@ -43,20 +43,22 @@ class ScoredProperty:
 
 
 def properties_of(campaign: Campaign) -> list[Candidate]:
-    """Return every lasting property that all logs can show.
+    """Return every lasting property that no log rules out and some log can show of the actuator.
 
     An error of the navigation is seen by forces only beside a hull that is known: one that comes from the same logs takes after
     it. Kinematics alone shows it before.
     """
-    profile: Profile = campaign.members[0].windows.measurements.profile
+    logs = [member.windows.measurements for member in campaign.members]
+    profile: Profile = logs[0].profile
     return [
         Candidate.of(one, instance, profile)
         for one in effects().values()
         if (one.vessel or one.id in INSTRUMENTS)
         and one.choose is None
         and (campaign.hull.known or not one.of_sensor)
-        and not any(one.untestable(member.windows.measurements) for member in campaign.members)
+        and not any(one.excluded(measurements) for measurements in logs)
         for instance in one.instances(profile)
+        if not all(one.cannot_be_of(measurements, instance) for measurements in logs)
     ]
 
 

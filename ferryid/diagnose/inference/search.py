@@ -94,7 +94,7 @@ def list_candidates(measurements: Measurements) -> tuple[list[Candidate], dict[s
             untested[effect.id] = reason
             continue
         profile = measurements.profile
-        candidates += [Candidate.of(effect, instance, profile) for instance in effect.instances(profile)]
+        candidates += [Candidate.of(effect, instance, profile) for instance in effect.testable_instances(measurements)]
     return candidates, untested
 
 
