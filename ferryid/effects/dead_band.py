@@ -34,6 +34,8 @@ RISE = 0.25
 """Share of the band below and above its end over which the force rises."""
 SIZE, LARGEST = 0.15, 0.5
 """Usual and largest band, in shares of the largest speed of the thrust curve."""
+NODES = 201
+"""Speeds at which a thrust curve is tabulated to be inverted."""
 DIRECT_MPS2, DIRECT_LARGEST_MPS2 = 0.02, 0.5
 """The same of an actuator that is ordered a force, by the acceleration that it gives the rigid body [m/s²]."""
 
@@ -79,17 +81,28 @@ def _able(actuator: Actuator, unit: str) -> bool:
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Take the force off within the band."""
     k = index_of(force_model, instance)
-    actuator, push = force_model.measurements.profile.actuators[k], along(force_model, k)
-    (low_ahead, high_ahead), (low_astern, high_astern) = (_rise(actuator, sign * end) for sign, end in zip((1, -1), p))
-    low = np.where(push < 0.0, low_astern, low_ahead)
-    width = np.maximum(np.where(push < 0.0, high_astern, high_ahead) - low, 1e-9)
-    return scaled(force_model, k, np.clip((np.abs(push) - low) / width, 0.0, 1.0))
+    push = along(force_model, k)
+    order = _order(force_model.measurements.profile.actuators[k], push)
+    return scaled(force_model, k, _share(order, np.where(push < 0.0, p[1], p[0])))
 
 
-def _rise(actuator: Actuator, end: float) -> Floats:
-    """Return the forces between which the actuator's rises from none to all, without their sign [N], shape (2,)."""
-    ends = np.array([1.0 - RISE, 1.0 + RISE]) * end
-    return np.abs(ends if actuator.kind == "force" else curve_force(actuator, ends))
+def _share(order: Floats, end: Floats) -> Floats:
+    """Return the share of the force that is left at an order without its sign, shape (n,): none below a band, all above."""
+    within = np.clip((order - (1.0 - RISE) * end) / np.maximum(2.0 * RISE * end, 1e-9), 0.0, 1.0)
+    return np.where(end > 0.0, within, 1.0)
+
+
+def _order(actuator: Actuator, push: Floats) -> Floats:
+    """Return the order without its sign at which an actuator gives a force by its curve, shape (n,)."""
+    if actuator.kind == "force":
+        return np.abs(push)
+    ahead, astern = (
+        (speeds, np.maximum.accumulate(np.abs(curve_force(actuator, sign * speeds))))
+        for sign, end in zip((1.0, -1.0), speed_limits(actuator), strict=True)
+        for speeds in [np.linspace(0.0, end, NODES)]
+    )
+    size = np.abs(push)
+    return np.where(push < 0.0, np.interp(size, astern[1], astern[0]), np.interp(size, ahead[1], ahead[0]))
 
 
 def cannot(measurements: Measurements) -> str:
@@ -102,10 +115,11 @@ def cannot_be_of(measurements: Measurements, instance: str | None) -> str:
     k = index_of(measurements, instance)
     actuator = measurements.profile.actuators[k]
     push = along(measurements, k)[measurements.usable]
+    order = _order(actuator, push)
     for sign, one in zip((1.0, -1.0), parameters_of(measurements.profile), strict=True):
+        turns = sign * push > 0.0
         # Bands of twice the usual size are looked for.
-        (_, most), size = _rise(actuator, sign * 2.0 * one.size), sign * push
-        if acts_in(size > most) and acts_in((size > 0.0) & (size < most)):
+        if acts_in(turns & (order > 2.0 * one.size)) and acts_in(turns & (order < 2.0 * one.size)):
             return ""
     return "no actuator ran both near zero and well above it"
 

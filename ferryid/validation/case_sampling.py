@@ -186,8 +186,8 @@ def _single(effect: PlantEffect) -> Callable[[int, np.random.Generator], Case]:
         # Anywhere in its fifth of the way from invisible to gross, by the logarithm.
         share = (level + rng.uniform()) / LEVELS
         size = least * (most / least) ** share
-        one = effect.sample(size, VESSELS["ferry"], rng, (None, None))
-        return _case(effect.id, "single", "ferry", rng, one, level=level, size=size)
+        one = effect.sample(size, VESSELS[effect.vessel], rng, (None, None))
+        return _case(effect.id, "single", effect.vessel, rng, one, level=level, size=size)
 
     return draw
 
@@ -220,7 +220,8 @@ def _several(cell: str, count: int) -> Callable[[int, np.random.Generator], Case
     def draw(number: int, rng: np.random.Generator) -> Case:
         vessel = ("ferry", "workboat")[number % 2]
         effects = plant_effects()
-        able = [name for name, one in effects.items() if not one.stochastic]
+        # Both vessels have thrusters like those of the ferry.
+        able = [name for name, one in effects.items() if not one.stochastic and one.vessel == "ferry"]
         while True:
             chosen = [able[k] for k in rng.choice(len(able), count, replace=False)]
             if not any(set(effects[name].excludes) & set(chosen) for name in chosen):

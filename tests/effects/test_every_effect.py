@@ -18,6 +18,8 @@ from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.simulate import parse_scenario, simulate, write_log
 from ferryid.vessel import load_profile
+from ferryid.vessel.profile import Profile
+from tests.effects.fixed_propellers import write
 
 pytestmark = pytest.mark.slow
 
@@ -31,6 +33,8 @@ controller = { delta = 0.7, sigma = 0.7 }
 DWELL_S = {"shallow_water": 60.0}
 """Where the time at a corner must be longer than `BRIEF_S` for an effect to be sized: a place has edges to be crossed."""
 BRIEF_S = 40.0
+BOTH_WAYS = ("astern_asymmetry",)
+"""Effects of what milliAmpère never does: its thrusters turn round instead of running astern."""
 HULL = ("m11", "m22", "m33", "X_u", "X_|u|u", "Y_v", "Y_|v|v", "Y_|r|v", "Y_|v|r", "N_r", "N_|r|r", "N_|r|v")
 """Coefficients that the true vessel has ten per cent off the profile's, either way."""
 NAMES = tuple(name for name, effect in effects().items() if effect.unsteady is None)
@@ -43,6 +47,9 @@ MODERATE = {
     "wind": {"north": -2.0, "east": 1.5, "C_X": 1.0, "C_Y": 1.0, "C_N": 1.0},
     "current": {"north": 0.1, "east": -0.08},
     "hull_parameters": {**dict.fromkeys(COEFFICIENTS, 1.0), "Y_|v|v": 2.0, "X_u": 2.2},
+    "dead_band": {"ahead": 200.0, "astern": 0.0},
+    "astern_asymmetry": {"factor": 0.8},
+    "thrust_saturation": {"ahead": 160.0, "astern": 304.1227},
     "shallow_water": {"factor": 1.6, "south": 12.0, "north": 34.0, "west": -18.0, "east": 4.0, "added_mass": 0.0},
 }
 """Where one size of every parameter would be gross, or no place for a ferry."""
@@ -62,10 +69,13 @@ def base(dwell_s: float = BRIEF_S) -> str:
     return BASE.replace("DWELL_S", f"{dwell_s}")
 
 
-def found_in(tables: dict[str, Any], seed: int, folder: Path, dwell_s: float = BRIEF_S) -> Search:
+def found_in(
+    tables: dict[str, Any], seed: int, folder: Path, dwell_s: float = BRIEF_S, vessel: Profile = FERRY
+) -> Search:
     """Simulate a round with these tables in its scenario, and search its log."""
     sensors = {"imu_rate_hz": 0.0, "camera_rate_hz": 0.0, **tables.get("sensors", {})}
-    text = base(dwell_s) + "".join(
+    name = vessel.path if vessel is not FERRY else FERRY.name
+    text = base(dwell_s).replace('vessel = "milliampere"', f'vessel = "{name}"') + "".join(
         f"{key} = {inline(value)}\n" for key, value in {**tables, "sensors": sensors}.items()
     )
     scenario = parse_scenario(text, "effect")
@@ -75,9 +85,9 @@ def found_in(tables: dict[str, Any], seed: int, folder: Path, dwell_s: float = B
         hull[coefficient] = sign * hull.get(coefficient, 1.0)
     log = folder / "trial.mcap"
     write_log(simulate(replace(scenario, true_hull=hull), seed), log)
-    measurements, _ = read_measurements(str(log), FERRY)
-    seen = windows(measurements, *window_lengths(FERRY))
-    plain, spread = prior_force_model(seen.measurements, FERRY)
+    measurements, _ = read_measurements(str(log), vessel)
+    seen = windows(measurements, *window_lengths(vessel))
+    plain, spread = prior_force_model(seen.measurements, vessel)
     return search(estimation_problem(seen, plain, spread), lambda stage: None)
 
 
@@ -94,10 +104,11 @@ def moderate(name: str) -> dict[str, float]:
 @pytest.mark.parametrize("name", NAMES)
 def test_effect_is_found_where_it_acts(name: str, tmp_path: Path) -> None:
     effect = effects()[name]
-    instance = effect.instances(FERRY)[-1]
-    parameters = effect.parameters_of(FERRY)
+    vessel = load_profile(write(tmp_path)) if name in BOTH_WAYS else FERRY
+    instance = effect.instances(vessel)[-1]
+    parameters = effect.parameters_of(vessel)
     truth = moderate(name)
-    result = found_in(effect.scenario(truth, instance), 3, tmp_path, DWELL_S.get(name, BRIEF_S))
+    result = found_in(effect.scenario(truth, instance), 3, tmp_path, DWELL_S.get(name, BRIEF_S), vessel)
     assert [(one.effect.id, one.instance) for one in result.fit.candidates[:1]] == [(name, instance)]
     assert effect.says(truth, instance)
     for one, value, error in zip(parameters, result.fit.values[0], result.fit.errors(0), strict=True):
@@ -130,3 +141,9 @@ def test_nothing_is_found_where_nothing_acts(seed: int, tmp_path: Path) -> None:
     result = found_in({}, seed, tmp_path)
     assert result.fit.candidates == ()
     assert result.rounds[0].none > 0.9
+
+
+def test_nothing_is_found_of_sound_propellers_that_run_astern(tmp_path: Path) -> None:
+    result = found_in({}, 3, tmp_path, vessel=load_profile(write(tmp_path)))
+    assert result.fit.candidates == ()
+    assert "astern_asymmetry" not in result.untested

@@ -169,4 +169,4 @@ def test_a_mooring_is_one_by_its_section_and_by_its_name() -> None:
         for text in (f"[environment.mooring]\n{spring}\n", f"[[effects]]\n{named}\n")
     )
     np.testing.assert_array_equal(section.eta, entry.eta)
-    assert simulated() == ["mooring"]
+    assert "mooring" in simulated()

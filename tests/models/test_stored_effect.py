@@ -30,13 +30,16 @@ from tests.models.test_store import made
 FERRY = load_profile("milliampere")
 HERE = "ab" * 32
 VESSEL = {
+    "astern_asymmetry",
     "azimuth_offset",
     "azimuth_resolution",
+    "dead_band",
     "fouling",
     "heading_bias",
     "hull_parameters",
     "lever_arm",
     "thrust_inflow_loss",
+    "thrust_saturation",
     "thruster_gain",
     "thruster_interaction",
     "thruster_lag",

@@ -10,6 +10,9 @@ SINGLE = "each thruster alone, at several speeds and angles, ahead and astern"
 COAST = "coasting to a stop from full speed with the thrusters off, ahead and sideways"
 ELSEWHERE = "the same manoeuvres in deep water, or over the whole of the place and far from it"
 STRAIGHT = "long straight runs at constant speed on opposite courses"
+STAIRCASE = "each thruster alone in small steps of its order through zero and up to full, both ways, each held until speed settles"
+BOTH_WAYS = "each thruster alone at the same orders ahead and astern, at rest"
+FULL = "each thruster alone in steps from half to full force, at rest"
 ACCELERATE = "hard acceleration and turning at low speed, and long straight runs at constant speed"
 
 PAIRS: tuple[tuple[frozenset[str], str], ...] = (
@@ -66,6 +69,32 @@ PAIRS: tuple[tuple[frozenset[str], str], ...] = (
     (frozenset({"waves", "thruster_lag"}), "the same manoeuvres in still water"),
     (frozenset({"thruster_gain", "azimuth_offset"}), SINGLE),
     (frozenset({"thruster_gain", "thruster_interaction"}), SINGLE),
+    (frozenset({"dead_band", "thruster_gain"}), STAIRCASE),
+    (frozenset({"dead_band", "thrust_saturation"}), STAIRCASE),
+    (frozenset({"dead_band", "astern_asymmetry"}), STAIRCASE),
+    (frozenset({"dead_band", "thruster_lag"}), STAIRCASE),
+    (frozenset({"dead_band", "thrust_inflow_loss"}), "small steps of each thruster's order at rest, and the same ones with way on"),
+    (frozenset({"dead_band", "thruster_interaction"}), STAIRCASE),
+    (frozenset({"dead_band", "hull_parameters"}), STAIRCASE),
+    (frozenset({"dead_band", "fouling"}), COAST),
+    (frozenset({"dead_band"}), STAIRCASE),
+    (frozenset({"astern_asymmetry", "thruster_gain"}), BOTH_WAYS),
+    (frozenset({"astern_asymmetry", "thrust_saturation"}), FULL + ", ahead and astern"),
+    (frozenset({"astern_asymmetry", "thrust_inflow_loss"}), BOTH_WAYS + ", and with way on"),
+    (frozenset({"astern_asymmetry", "thruster_interaction"}), BOTH_WAYS),
+    (frozenset({"astern_asymmetry", "hull_parameters"}), BOTH_WAYS),
+    (frozenset({"astern_asymmetry", "fouling"}), COAST),
+    (frozenset({"astern_asymmetry", "current"}), STRAIGHT),
+    (frozenset({"astern_asymmetry", "wind"}), TURN),
+    (frozenset({"astern_asymmetry"}), BOTH_WAYS),
+    (frozenset({"thrust_saturation", "thruster_gain"}), FULL),
+    (frozenset({"thrust_saturation", "thrust_inflow_loss"}), FULL + ", and again at speed"),
+    (frozenset({"thrust_saturation", "thruster_interaction"}), FULL),
+    (frozenset({"thrust_saturation", "thruster_lag"}), STEPS),
+    (frozenset({"thrust_saturation", "hull_parameters"}), COAST),
+    (frozenset({"thrust_saturation", "fouling"}), COAST),
+    (frozenset({"thrust_saturation", "payload"}), FULL + ", and hard accelerations at half force"),
+    (frozenset({"thrust_saturation"}), FULL),
     (frozenset({"thruster_gain"}), SINGLE),
     (frozenset({"azimuth_offset"}), SINGLE),
 )
@@ -81,6 +110,9 @@ SHOWS = {
     "fouling": SPEEDS,
     "thruster_gain": SINGLE,
     "azimuth_offset": SINGLE,
+    "dead_band": STAIRCASE,
+    "astern_asymmetry": BOTH_WAYS,
+    "thrust_saturation": FULL,
     "azimuth_resolution": SINGLE,
     "thruster_lag": STEPS,
     "time_delay": STEPS,

@@ -27,12 +27,18 @@ RACE_SHARE = 0.25
 """Thrust that a race not yet formed gives besides."""
 RACE_S = 0.08
 """Time in which it forms at full speed; longer at less."""
+CORNER = 12.0
+"""Power with which a thrust bends into a limit of its motor's current: 6 % are missing at the limit."""
 AT_SPEED = 0.6
 """Share of the most speed at which the loss to inflow is defined."""
 
 
 class ThrusterConstants(NamedTuple):
-    """Thrusters, ready for compiled code: places (k, 3), coefficients and most speeds (k,), losses, when a gain holds."""
+    """Thrusters, ready for compiled code: places (k, 3), coefficients and most speeds (k,), losses, when a gain holds.
+
+    `band` are speeds of the race ahead and astern below which there is no thrust [rpm], `limit` the most thrust either way [N],
+    shape (k, 2).
+    """
 
     place: Floats
     ahead: Floats
@@ -45,6 +51,8 @@ class ThrusterConstants(NamedTuple):
     lag_s: float
     inflow: float
     interaction: float
+    band: Floats
+    limit: Floats
 
 
 def thruster_constants(vessel: Vessel) -> ThrusterConstants:
@@ -62,6 +70,8 @@ def thruster_constants(vessel: Vessel) -> ThrusterConstants:
         lag_s=0.0,
         inflow=0.0,
         interaction=0.0,
+        band=np.zeros((len(every), 2)),
+        limit=np.full((len(every), 2), 1e9),
     )
 
 
@@ -109,9 +119,14 @@ def thrust(
         x, y, z = gear.place[i]
         a = angle + gear.offset[i]
         along = (nu[0] - nu[5] * y + nu[4] * z) * cos(a) + (nu[1] + nu[5] * x - nu[3] * z) * sin(a)
-        parts[i, 1] = push
+        side = 0 if state[i, 2] >= 0.0 else 1
+        # Blades that do not bite yet give nothing, whatever flows past them.
+        bites = 1.0 if abs(state[i, 2]) >= gear.band[i, side] else 0.0
+        push *= bites
+        parts[i, 1] = _limited(gear, i, push)
         # Thrust falls linearly with the advance ratio: with n times inflow.
-        push -= gear.inflow * coefficient * AT_SPEED * most * abs(n) * along
+        push -= bites * gear.inflow * coefficient * AT_SPEED * most * abs(n) * along
+        push = _limited(gear, i, push)
         if gear.gain_span[0] <= t < gear.gain_span[1]:
             push *= gear.gain[i]
             parts[i, 1] *= gear.gain[i]
@@ -135,6 +150,13 @@ def thrust(
         out[3] -= z * Y
         out[4] += z * X
         out[5] += x * Y - y * X
+
+
+@compiled
+def _limited(gear: ThrusterConstants, i: int, push: float) -> float:
+    """Return the thrust that the current of the motor allows."""
+    limit = gear.limit[i, 0 if push >= 0.0 else 1]
+    return float(push / (1.0 + (abs(push) / limit) ** CORNER) ** (1.0 / CORNER))
 
 
 @compiled

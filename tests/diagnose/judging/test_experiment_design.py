@@ -9,6 +9,8 @@ import pytest
 from ferryid.diagnose.judging.experiment_design import OTHERWISE, PAIRS, SHOWS, manoeuvre
 from ferryid.effects import effects
 
+OF_ACTUATORS = ("dead_band", "astern_asymmetry", "thrust_saturation", "thruster_gain")
+"""Effects that take force from one actuator, each over another part of its range."""
 RELATED = ("fouling", "hull_parameters", "shallow_water", "payload", "thruster_gain")
 """Effects that explain more or less of the same: those of mass, damping and strength."""
 
@@ -20,7 +22,7 @@ def test_pairs_are_of_known_effects_and_stand_once() -> None:
     assert set().union(*pairs) <= known
 
 
-@pytest.mark.parametrize(("one", "other"), list(combinations(RELATED, 2)))
+@pytest.mark.parametrize(("one", "other"), [*combinations(RELATED, 2), *combinations(OF_ACTUATORS, 2)])
 def test_related_effects_have_a_manoeuvre_of_their_own(one: str, other: str) -> None:
     text = manoeuvre(one, [other])
     assert text is not None

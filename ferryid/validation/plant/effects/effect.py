@@ -79,6 +79,9 @@ class PlantEffect:
         Effects that it is not combined with, as no log distinguishes them.
     neutral
         Value at which a parameter changes nothing.
+    vessel
+        That its detection curve is of: the ferry, but for what the ferry's thrusters, which turn round, never do. It is combined
+        with others on vessels like that one only.
     positions
         Parameters that are places on the chart, whose distance from neutral means nothing.
     """
@@ -98,6 +101,7 @@ class PlantEffect:
     stochastic: bool = False
     excludes: tuple[str, ...] = ()
     neutral: float = 0.0
+    vessel: str = "ferry"
     positions: tuple[str, ...] = ()
 
 
