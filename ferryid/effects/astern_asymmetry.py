@@ -53,7 +53,7 @@ def says(values: Values, instance: str | None) -> str:
 
 def thrust(p: Any, speed: float, force: float) -> float:
     """Return the simulated force of the actuator."""
-    return p[0] * force if force < 0.0 else force
+    return float(p[0]) * force if force < 0.0 else force
 
 
 def regressor(force_model: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:

@@ -27,6 +27,7 @@ from ferryid.effects.actuator_force import (
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import ForceModel, Measurements
 from ferryid.effects.simulated import Simulated, entry
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
 from ferryid.vessel.profile import Actuator, Profile
 
@@ -142,7 +143,7 @@ def thrust(p: Any, speed: float, force: float) -> float:
     band = p[0] if speed >= 0.0 else p[1]
     if band <= 0.0:
         return force
-    return force * min(max((abs(speed) / band - 1.0 + RISE) / (2.0 * RISE), 0.0), 1.0)
+    return float(force * min(max((abs(speed) / band - 1.0 + RISE) / (2.0 * RISE), 0.0), 1.0))
 
 
 def regressor(force_model: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
@@ -164,5 +165,6 @@ EFFECT = Effect(
     unreported=unreported,
     in_part=True,
     regressor=regressor,
+    formula_error=EFFECTS.load_error,
     simulated=Simulated(thrust=thrust),
 )

@@ -77,7 +77,9 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
 
 def cannot(measurements: Measurements) -> str:
     """Return why the measurements cannot show it of any actuator."""
-    return "" if instances(measurements.profile) else "no actuator has a thrust curve with an end and an unmeasured force"
+    return (
+        "" if instances(measurements.profile) else "no actuator has a thrust curve with an end and an unmeasured force"
+    )
 
 
 def cannot_be_of(measurements: Measurements, instance: str | None) -> str:
@@ -105,7 +107,7 @@ def says(values: Values, instance: str | None) -> str:
 
 def thrust(p: Any, speed: float, force: float) -> float:
     """Return the simulated force of the actuator: cut off at its limits."""
-    return min(force, p[0]) if force > 0.0 else max(force, -p[1])
+    return float(min(force, p[0]) if force > 0.0 else max(force, -p[1]))
 
 
 def regressor(force_model: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:

@@ -97,7 +97,9 @@ def test_astern_asymmetry_leaves_ahead_as_it_is() -> None:
 
 def test_saturation_cuts_off_at_its_limits() -> None:
     # 90, 360 and -270 N; half-way through the bend of 10 N a quarter of it is missing.
-    forces = left("thrust_saturation", (200.0, 100.0), [np.sqrt(90.0 / AHEAD), np.sqrt(360.0 / AHEAD), -np.sqrt(270.0 / ASTERN)])
+    forces = left(
+        "thrust_saturation", (200.0, 100.0), [np.sqrt(90.0 / AHEAD), np.sqrt(360.0 / AHEAD), -np.sqrt(270.0 / ASTERN)]
+    )
     np.testing.assert_allclose(forces, [90.0, 200.0, -100.0])
     (within,) = left("thrust_saturation", (200.0, 100.0), [np.sqrt(200.0 / AHEAD)])
     assert within == pytest.approx(200.0 - 10.0**2 / 40.0)

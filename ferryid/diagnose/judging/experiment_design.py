@@ -10,7 +10,7 @@ SINGLE = "each thruster alone, at several speeds and angles, ahead and astern"
 COAST = "coasting to a stop from full speed with the thrusters off, ahead and sideways"
 ELSEWHERE = "the same manoeuvres in deep water, or over the whole of the place and far from it"
 STRAIGHT = "long straight runs at constant speed on opposite courses"
-STAIRCASE = "each thruster alone in small steps of its order through zero and up to full, both ways, each held until speed settles"
+STAIRCASE = "each thruster alone in small steps of its order from full ahead through zero to full astern, each held"
 BOTH_WAYS = "each thruster alone at the same orders ahead and astern, at rest"
 FULL = "each thruster alone in steps from half to full force, at rest"
 ACCELERATE = "hard acceleration and turning at low speed, and long straight runs at constant speed"
@@ -73,7 +73,10 @@ PAIRS: tuple[tuple[frozenset[str], str], ...] = (
     (frozenset({"dead_band", "thrust_saturation"}), STAIRCASE),
     (frozenset({"dead_band", "astern_asymmetry"}), STAIRCASE),
     (frozenset({"dead_band", "thruster_lag"}), STAIRCASE),
-    (frozenset({"dead_band", "thrust_inflow_loss"}), "small steps of each thruster's order at rest, and the same ones with way on"),
+    (
+        frozenset({"dead_band", "thrust_inflow_loss"}),
+        "small steps of each thruster's order at rest, and again with way on",
+    ),
     (frozenset({"dead_band", "thruster_interaction"}), STAIRCASE),
     (frozenset({"dead_band", "hull_parameters"}), STAIRCASE),
     (frozenset({"dead_band", "fouling"}), COAST),

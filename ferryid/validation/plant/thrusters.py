@@ -27,8 +27,8 @@ RACE_SHARE = 0.25
 """Thrust that a race not yet formed gives besides."""
 RACE_S = 0.08
 """Time in which it forms at full speed; longer at less."""
-CORNER = 12.0
-"""Power with which a thrust bends into a limit of its motor's current: 6 % are missing at the limit."""
+CORNER = 30.0
+"""Power with which a thrust bends into a limit of its motor's current: 2 % are missing at the limit."""
 AT_SPEED = 0.6
 """Share of the most speed at which the loss to inflow is defined."""
 

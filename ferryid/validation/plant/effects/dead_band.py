@@ -28,7 +28,7 @@ def act(plant: Plant, conditions: Conditions, rng: np.random.Generator) -> None:
 EFFECT = PlantEffect(
     "dead_band",
     "share of the most speed",
-    (0.02, 0.4),
+    (0.05, 0.45),
     0.17,
     sample,
     rank=20,

@@ -80,8 +80,8 @@ class PlantEffect:
     neutral
         Value at which a parameter changes nothing.
     vessel
-        That its detection curve is of: the ferry, but for what the ferry's thrusters, which turn round, never do. It is combined
-        with others on vessels like that one only.
+        That its detection curve is of: the ferry, but for what the ferry's thrusters, which turn round, never do; that is not
+        combined with others.
     positions
         Parameters that are places on the chart, whose distance from neutral means nothing.
     """
