@@ -28,9 +28,18 @@ def along(force_model: ForceModel | Measurements, k: int) -> Floats:
 
 
 def scaled(force_model: ForceModel, k: int, share: Floats) -> ForceModel:
-    """Return the force model with the force of actuator `k` multiplied by a share, shape (n,); a rudder's is in proportion."""
-    parts = force_model.parts.copy()
-    parts[:, k] *= share[:, None]
+    """Return the force model with the force of actuator `k` along its own direction multiplied by a share, shape (n,).
+
+    Of a propeller with a rudder that is the force ahead: across it is the rudder's, which lives on the vessel's own flow where
+    the propeller is weak or turns astern.
+    """
+    actuator, parts = force_model.measurements.profile.actuators[k], force_model.parts.copy()
+    if actuator.kind == "propeller_rudder":
+        more = (share - 1.0) * parts[:, k, 0]
+        parts[:, k, 0] += more
+        parts[:, k, 2] -= actuator.position_m[1] * more
+    else:
+        parts[:, k] *= share[:, None]
     return replace(force_model, parts=parts)
 
 

@@ -75,6 +75,16 @@ def test_only_its_own_actuator_is_changed_and_its_moment_in_proportion(effect: s
     np.testing.assert_allclose(here[:, 0, 2], 1.0 * here[:, 0, 0])
 
 
+def test_the_side_force_of_a_rudder_stays() -> None:
+    port = replace(vessel().actuators[0], kind="propeller_rudder")
+    ruddered = replace(vessel(), actuators=(port, *vessel().actuators[1:]))
+    before = turning(np.array([-500.0, 500.0]), ruddered)
+    before.parts[:, 0] += [0.0, 20.0, -30.0]
+    after = effects()["astern_asymmetry"].apply(before, np.array([0.6]), "port").parts[:, 0]
+    # Of 75 N astern, one metre to port, 45 N are left: 30 N·m less to port.
+    np.testing.assert_allclose(after - before.parts[:, 0], [[30.0, 0.0, 30.0], [0.0, 0.0, 0.0]], atol=1e-9)
+
+
 def test_a_dead_band_takes_all_within_and_nothing_beyond_each_side_by_itself() -> None:
     speeds = [100.0, 150.0, 200.0, 250.0, 251.0, -200.0, -300.0, -375.0, -400.0]
     share = [0.0, 0.0, 0.5, 1.0, 1.0, 0.0, 0.5, 1.0, 1.0]

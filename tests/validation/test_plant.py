@@ -202,6 +202,22 @@ def test_losses_are_as_large_as_they_are_asked_for() -> None:
     assert beside == pytest.approx(alone, rel=0.01)
 
 
+def test_a_thruster_gives_nothing_in_its_dead_band_less_astern_and_no_more_than_its_limit() -> None:
+    one = SURVEYOR.thrusters[0]
+
+    def port(rpm: float, **conditions: Any) -> float:
+        return float(pushed(SURVEYOR, [rpm, 0.0, 0.0], [0.0, 0.0, 90.0], **conditions)[0])
+
+    band = {"dead_band_rpm": {one.name: (300.0, 400.0)}}
+    ends = [port(rpm, **band) / port(rpm) for rpm in (299.0, 301.0, -399.0, -401.0)]
+    assert ends == [0.0, 1.0, 0.0, 1.0]
+    worn = {"astern": {one.name: 0.7}}
+    assert [port(rpm, **worn) / port(rpm) for rpm in (900.0, -900.0)] == pytest.approx([1.0, 0.7])
+    limit = {"thrust_limit_N": {one.name: (60.0, 40.0)}}
+    assert [port(rpm, **limit) for rpm in (1700.0, -1700.0)] == pytest.approx([60.0, -40.0], rel=1e-3)
+    assert port(600.0, **limit) == pytest.approx(port(600.0))
+
+
 def test_a_late_force_comes_as_late_as_it_should() -> None:
     """The centre of the answer to a step is the sum of both stages."""
     one = replace(FERRY, thrusters=FERRY.thrusters[:1])

@@ -38,7 +38,7 @@ class PropertyTest:
     gain
         Held-out log-likelihood over that of no such property.
     holding
-        Logs that are predicted better with it on held-out stretches, of all.
+        Logs that are predicted better with it on held-out stretches, of all that can show it.
     improvement
         Share of the held-out squared force error of all logs that it removes, shape (3,).
     rivals
@@ -127,13 +127,23 @@ def tested(made: CampaignFit, candidate: Candidate, rivals: Sequence[ScoredPrope
     without = without_property(made, candidate)
     before, after = held_out_loss(without), held_out_loss(made)
     gains = after.gain(before)
-    by_log = [float(gains[after.log == i].sum()) for i in range(len(made.parts))]
+    seen = [member.windows.measurements for member in made.campaign.members]
+    effect = candidate.effect
+    # A log that does not show the actuator in the range concerned is predicted neither better nor worse.
+    able = [i for i, one in enumerate(seen) if not effect.cannot_be_of(one, candidate.instance)]
+    by_log = [float(gains[after.log == i].sum()) for i in able]
     masses = [mass_of(member.plain.hull) for member in made.campaign.members]
     squares = [
         np.sum([np.sum((one @ M.T) ** 2, axis=0) for one, M in zip(loss.errors, masses, strict=True)], axis=0)
         for loss in (before, after)
     ]
     value, error = _estimate(made, candidate)
+    unreported = frozenset.intersection(*(effect.unreported(one, value) for one in seen))
+    reported = [
+        (one, float(at), float(e))
+        for one, at, e in zip(candidate.parameters, value, error, strict=True)
+        if one.name not in unreported
+    ]
     evidence = made.evidence - without.evidence
     others = [
         Rival(one.candidate.effect.id, one.candidate.instance, min(one.gain - evidence, 0.0))
@@ -142,16 +152,13 @@ def tested(made: CampaignFit, candidate: Candidate, rivals: Sequence[ScoredPrope
     ]
     return PropertyTest(
         candidate,
-        {
-            one.name: Estimate.normal(float(at), float(e), one.unit)
-            for one, at, e in zip(candidate.parameters, value, error, strict=True)
-        },
+        {one.name: Estimate.normal(at, e, one.unit) for one, at, e in reported},
         evidence,
         Gain.of(gains),
         (sum(one > 0.0 for one in by_log), len(by_log)),
         np.asarray(1.0 - squares[1] / np.where(squares[0] > 0.0, squares[0], np.inf)),
         tuple({(one.effect, one.instance): one for one in reversed(others)}.values()),
-        any(_at_bound(one, float(at)) for one, at in zip(candidate.parameters, value, strict=True)),
+        any(_at_bound(one, at) for one, at, _ in reported),
     )
 
 

@@ -24,7 +24,7 @@ def act(plant: Plant, conditions: Conditions, rng: np.random.Generator) -> None:
 EFFECT = PlantEffect(
     "astern_asymmetry",
     "share of the force astern",
-    (0.01, 0.6),
+    (0.005, 0.5),
     0.25,
     sample,
     rank=21,
