@@ -95,7 +95,7 @@ def in_groups(campaign: Campaign, names: Sequence[str]) -> Campaign:
 
 
 def differences_of(campaign: Campaign) -> list[Candidate]:
-    """Return every difference that all logs can show.
+    """Return every difference that no log rules out and, of an actuator, some log of each group can show.
 
     One whose neutral value is an end of what is possible, as a lag or a load, may act in either group.
     """
@@ -107,7 +107,7 @@ def differences_of(campaign: Campaign) -> list[Candidate]:
             continue
         for instance in one.instances(profile):
             candidate = Candidate.of(one, instance, profile)
-            if candidate.parameters:
+            if candidate.parameters and _shown_in_each_group(candidate, campaign):
                 found += [replace(candidate, group=group) for group in _groups(candidate)]
     return [*found, *_all_thrusters(campaign)]
 
@@ -121,7 +121,16 @@ def _untestable(effect: Effect, campaign: Campaign) -> bool:
     every = [member.windows.measurements for member in campaign.members]
     if effect.id in OF_HULL:
         return any(one.profile.setting in effect.absent_in for one in every)
-    return any(effect.untestable(one) for one in every)
+    return any(effect.excluded(one) for one in every)
+
+
+def _shown_in_each_group(candidate: Candidate, campaign: Campaign) -> bool:
+    shown = {
+        one.group
+        for one in campaign.members
+        if not candidate.effect.cannot_be_of(one.windows.measurements, candidate.instance)
+    }
+    return shown == {one.group for one in campaign.members}
 
 
 def _all_thrusters(campaign: Campaign) -> list[Candidate]:

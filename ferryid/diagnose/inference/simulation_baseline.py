@@ -205,7 +205,7 @@ def _carried(simulated: Simulation, measurements: Measurements, shift_s: float) 
     return [
         replace(one, candidate=_later(one.candidate, shift_s))
         for one in simulated.conditions
-        if not one.in_hull and not one.candidate.effect.untestable(measurements)
+        if not one.in_hull and not one.candidate.effect.excluded(measurements)
     ]
 
 
@@ -232,7 +232,7 @@ def difference_notes(simulated: Simulation, measurements: Measurements) -> list[
         f"The {one.candidate.effect.id} differs by what was measured, and is no finding: "
         f"{_described(one, simulated.measurements)} in the simulation; the recording's own is part of its force model."
         for one in simulated.conditions
-        if one.candidate.effect.untestable(measurements) and not one.in_hull
+        if one.candidate.effect.excluded(measurements) and not one.in_hull
     ]
 
 
