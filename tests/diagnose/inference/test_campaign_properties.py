@@ -90,3 +90,23 @@ def test_errors_of_the_navigation_need_a_known_hull() -> None:
     assert {"lever_arm", "heading_bias"} <= {one.effect.id for one in properties_of(known)}
     assert not {"lever_arm", "heading_bias"} & {one.effect.id for one in properties_of(guessed)}
     assert np.isfinite(score(estimate_campaign(known), properties_of(known)[0]))
+
+
+def test_what_one_log_shows_of_one_actuator_is_weighed_of_that_actuator() -> None:
+    whole = campaign(CALM, conditions=())
+
+    def turning(member: Member, *, astern: bool) -> Member:
+        seen = member.windows.measurements
+        push = 200.0 * np.sin(seen.t / 9.0)
+        parts, angles = np.zeros_like(seen.parts), np.zeros_like(seen.angles)
+        parts[:, 0, 0] = push if astern else np.abs(push)
+        windows = replace(member.windows, measurements=replace(seen, parts=parts, angles=angles))
+        return replace(member, windows=windows)
+
+    def asymmetries(*astern: bool) -> list[str | None]:
+        members = tuple(turning(one, astern=way) for one, way in zip(whole.members, astern, strict=True))
+        every = properties_of(replace(whole, members=members))
+        return [one.instance for one in every if one.effect.id == "astern_asymmetry"]
+
+    assert asymmetries(False, False, False) == []
+    assert asymmetries(False, True, False) == ["thruster1"]
