@@ -164,6 +164,9 @@ class Effect:
         in a part of the manoeuvres.
     changes_hull
         True where the effect changes how the hull's coefficients act: masses, damping, the flow.
+    piecewise
+        True where a parameter is the end of a range, so that the slope where a search begins leads a part of the way only, and a
+        fit that ranks it among others takes more steps.
     profiled
         Parameter that others trade with, along which the posterior of an effect that acts all along is followed; empty where
         its curvature tells all.
@@ -211,6 +214,7 @@ class Effect:
     formula_error: float = EFFECTS.formula_error
     passing_size: float = 0.0
     changes_hull: bool = False
+    piecewise: bool = False
     profiled: str = ""
     of_sensor: bool = False
     unsteady: Callable[[ForceModel], Processes] | None = None

@@ -126,6 +126,7 @@ EFFECT = Effect(
     cannot=cannot,
     cannot_be_of=cannot_be_of,
     vessel=True,
+    piecewise=True,
     unreported=unreported,
     in_part=True,
     regressor=regressor,

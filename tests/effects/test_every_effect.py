@@ -147,3 +147,11 @@ def test_nothing_is_found_of_sound_propellers_that_run_astern(tmp_path: Path) ->
     result = found_in({}, 3, tmp_path, vessel=load_profile(write(tmp_path)))
     assert result.fit.candidates == ()
     assert "astern_asymmetry" not in result.untested
+
+
+def test_a_limit_far_above_the_start_of_its_search_is_found(tmp_path: Path) -> None:
+    """Of 496 N: the search begins at 30 % of that, and few of the log's forces reach the limit."""
+    truth = {**moderate("thrust_saturation"), "ahead": 250.0}
+    result = found_in(effects()["thrust_saturation"].scenario(truth, "thruster1"), 3, tmp_path)
+    assert [one.key for one in result.fit.candidates] == [("thrust_saturation", "thruster1")]
+    assert result.fit.values[0][0] == pytest.approx(250.0, rel=0.03)

@@ -38,7 +38,9 @@ from ferryid.effects.force_model import Measurements
 from ferryid.types import Floats
 
 COARSE_ITERATIONS = 8
-"""Iterations of a fit that ranks candidates from the prior, `COMPARING_ITERATIONS` from near by; the best then converge."""
+"""Iterations of a fit that ranks candidates from the prior or by piecewise slopes, `COMPARING_ITERATIONS` from near by.
+
+The best then converge."""
 
 
 @dataclass(frozen=True)
@@ -220,7 +222,7 @@ def _best_fit(
             problem,
             (*current.candidates, one),
             start,
-            steps=COARSE_ITERATIONS if from_prior else COMPARING_ITERATIONS,
+            steps=COARSE_ITERATIONS if from_prior or one.effect.piecewise else COMPARING_ITERATIONS,
             begin=None if from_prior else begin,
         )
         return scored(made)
