@@ -128,6 +128,9 @@ class Effect:
         ``cannot_be_of(measurements, instance)`` returns why they cannot show it of one of its instances, in the same form.
     onset
         True where it may begin or end during the log.
+    longest_s
+        Longest time for which it acts [s], at most `EFFECTS.longest_share` of a log, as one that never lasts throughout: see
+        `passing`. Infinite for one that may.
     impulse
         ``impulse(force_model, p)`` returns the momentum that an effect gives the vessel if it begins in a row
         [N·s, N·s, N·m·s], shape (n, 3). What ends leaves the velocity as it is.
@@ -203,6 +206,7 @@ class Effect:
     cannot: Callable[[Measurements], str] = lambda measurements: ""
     cannot_be_of: Callable[[Measurements, str | None], str] = lambda measurements, instance: ""
     onset: bool = False
+    longest_s: float = inf
     impulse: Callable[[ForceModel, Floats], Floats] | None = None
     vessel: bool = False
     choose: Callable[[ForceModel, Floats, Residual], Choice] | None = None
@@ -245,6 +249,11 @@ class Effect:
         """Return the instances of which the measurements can show it."""
         every = () if self.excluded(measurements) else self.instances(measurements.profile)
         return tuple(one for one in every if not self.cannot_be_of(measurements, one))
+
+    @property
+    def passing(self) -> bool:
+        """True for what only ever comes and goes: it begins and ends within a log, or touches one end of it, and is short."""
+        return isfinite(self.longest_s)
 
     def log_rarity(self, profile: Profile) -> float:
         """Return by how much its log prior odds are lower in the profile's setting than elsewhere [nat]."""

@@ -22,6 +22,7 @@ from ferryid.compiled import callback
 
 if TYPE_CHECKING:
     from ferryid.effects.effect import Values
+    from ferryid.vessel.profile import Profile
 
 Load = Callable[..., tuple[float, float, float]]
 Thrust = Callable[[Any, float, float], float]
@@ -43,10 +44,13 @@ class Simulated:
     thrust
         ``thrust(p, speed, force)`` returns the force of a thruster [N] in place of what its curve gives at a speed [rpm; N for
         one that is ordered directly]. An effect of one thruster acts on that one, one of the whole vessel on each.
+    constants
+        ``constants(profile, thruster)`` returns what else `p` ends with, by the vessel and the thruster it is an effect of.
     """
 
     load: Load | None = None
     thrust: Thrust | None = None
+    constants: Callable[[Profile, str], tuple[float, ...]] = lambda profile, thruster: ()
 
 
 def entry(effect: str, values: Values, instance: str | None) -> dict[str, Any]:

@@ -114,6 +114,30 @@ class EffectThresholds:
         "smaller changes of a thruster's force that both begin and end within the log are hints",
         "convention: as much as `formula_error`, hull and formulas are off in a part of the manoeuvres",
     )
+    longest_push: float = threshold(
+        300.0,
+        "s",
+        "longest time for which a push from outside acts",
+        "convention: five minutes; what lasts longer is a wind, a mooring or a load",
+    )
+    longest_share: float = threshold(
+        1.0 / 3.0,
+        "of the log",
+        "most of a log in which a push from outside acts",
+        "convention: a third, so that most of the log is without it",
+    )
+    least_ventilation: float = threshold(
+        0.05,
+        "of the thrust",
+        "smaller losses by ventilation are void, intervals no narrower",
+        "convention: 5 %, at high loading only",
+    )
+    ventilated: float = threshold(
+        0.8,
+        "of the thrust",
+        "largest share of its force that a ventilated propeller keeps for it to be no error of the thrust curve",
+        "convention: curves are off by some ten per cent near their end; measured losses are 20 % to 80 %",
+    )
     slowest_waves: float = threshold(
         0.25,
         "of the usual frequency",

@@ -24,6 +24,7 @@ from ferryid.diagnose.inference.folds import block_s
 from ferryid.diagnose.inference.noise_model import stride_s
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.effects.force_model import ForceModel, as_measured
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats, Ints
 
 MOST_VALUES = 1e7
@@ -72,15 +73,11 @@ def promising_spans(problem: EstimationProblem, linearisation: Linearisation, ca
 
     The log is cut into parts; what a candidate adds in a part is linear in its parameters there, and what it adds in a span is
     the sum of the parts'. So one set of cross-products holds the evidence of every span, hull and other effects refitted.
+
+    What only passes has to stand out: see `_elsewhere`.
     """
-    edges = _edges(problem, candidate)
+    edges, a, b, gain = _scan(problem, linearisation, candidate)
     parts = len(edges) - 1
-    G, g = _cross_products(problem, linearisation, candidate, edges)
-    a, b = np.triu_indices(parts + 1, 1)
-    part = (a > 0) | (b < parts)
-    a, b = a[part], b[part]
-    gain = _gains(G, g, a, b, candidate)
-    gain -= ((a > 0).astype(np.float64) + (b < parts)) * log(len(problem.windows.starts))
     found: list[tuple[int, int]] = []
     for k in np.argsort(-gain).tolist():
         if gain[k] <= 0.0 or len(found) == INFERENCE.fitted_spans:
@@ -89,9 +86,88 @@ def promising_spans(problem: EstimationProblem, linearisation: Linearisation, ca
         if all(max(abs(int(a[k]) - i), abs(int(b[k]) - j)) > 1 for i, j in found):
             found.append((int(a[k]), int(b[k])))
     return [
-        replace(candidate, onset_s=float(edges[i]) if i > 0 else 0.0, offset_s=float(edges[j]) if j < parts else inf)
+        _standing_out(
+            problem,
+            replace(
+                candidate, onset_s=float(edges[i]) if i > 0 else 0.0, offset_s=float(edges[j]) if j < parts else inf
+            ),
+            _elsewhere(a, b, gain, i, j),
+        )
         for i, j in found
     ]
+
+
+def standing_out(problem: EstimationProblem, linearisation: Linearisation, candidate: Candidate) -> Candidate:
+    """Return a candidate in its span with the prior odds by how much it stands out there; unchanged if it does not pass."""
+    if not candidate.effect.passing:
+        return candidate
+    edges, a, b, gain = _scan(problem, linearisation, candidate)
+    i = int(np.searchsorted(edges, candidate.onset_s, side="right")) - 1
+    j = int(np.searchsorted(edges, min(candidate.offset_s, edges[-1])))
+    return _standing_out(problem, candidate, _elsewhere(a, b, gain, max(i, 0), j))
+
+
+def _standing_out(problem: EstimationProblem, candidate: Candidate, elsewhere: float) -> Candidate:
+    """Return a passing candidate with what counts against it from elsewhere in the log [nat]; any other as it is."""
+    if not candidate.effect.passing:
+        return candidate
+    rarity = candidate.effect.log_rarity(problem.plain.measurements.profile)
+    return replace(candidate, log_alternatives=rarity + INFERENCE.contrast * elsewhere)
+
+
+def _elsewhere(a: Ints, b: Ints, gain: Floats, i: int, j: int) -> float:
+    """Return the most evidence that spans would have which neither overlap nor touch the one from part i up to j.
+
+    Where nothing pushes, that is what unsteady forces, a hull that is off and noise make of a push. One is an event only where
+    it is far stronger than all of these, and one that came twice alike is no event but something unsteady.
+    """
+    apart = (b < i) | (a > j)
+    return max(0.0, float(gain[apart].max(initial=0.0)))
+
+
+def _scan(
+    problem: EstimationProblem, linearisation: Linearisation, candidate: Candidate
+) -> tuple[Floats, Ints, Ints, Floats]:
+    """Return where the log is cut [s], and spans by their first part and the one after their last with their evidence."""
+    edges = _edges(problem, candidate)
+    parts = len(edges) - 1
+    a, b = np.triu_indices(parts + 1, 1)
+    tried = ((a > 0) | (b < parts)) & (edges[b] - edges[a] <= longest_s(problem, candidate))
+    a, b = a[tried], b[tried]
+    if not len(a):
+        return edges, a, b, np.empty(0)
+    G, g = _cross_products(problem, linearisation, candidate, edges)
+    gain = _gains(G, g, a, b, candidate)
+    gain -= ((a > 0).astype(np.float64) + (b < parts)) * log(len(problem.windows.starts))
+    return edges, a, b, gain
+
+
+def longest_s(problem: EstimationProblem, candidate: Candidate) -> float:
+    """Return for how many seconds a candidate may act; infinite for one that may act throughout."""
+    if not candidate.effect.passing:
+        return inf
+    times = problem.steps.middle_s
+    return min(candidate.effect.longest_s, EFFECTS.longest_share * float(times[-1] - times[0]))
+
+
+def passes(problem: EstimationProblem, candidate: Candidate) -> bool:
+    """Tell whether a candidate's span is one of an effect that passes: not the whole log, and short."""
+    return bool(candidate.times) and span_s(problem, candidate) <= longest_s(problem, candidate)
+
+
+def span_s(problem: EstimationProblem, candidate: Candidate) -> float:
+    """Return how long a candidate acts within the log [s], gaps included."""
+    times = problem.steps.middle_s
+    return min(candidate.offset_s, float(times[-1])) - max(candidate.onset_s, float(times[0]))
+
+
+def in_the_middle(problem: EstimationProblem, candidate: Candidate) -> Candidate:
+    """Return a candidate that passes as it would in the middle of a log, half as long as it may; any other as it is."""
+    if not candidate.effect.passing:
+        return candidate
+    times = problem.steps.middle_s
+    middle, half = 0.5 * float(times[0] + times[-1]), 0.25 * longest_s(problem, candidate)
+    return replace(candidate, onset_s=middle - half, offset_s=middle + half)
 
 
 def part_s(problem: EstimationProblem, candidate: Candidate) -> float:
@@ -189,6 +265,8 @@ def refine_span(
                 moved = best.candidates[index].moved(end, time)
                 if lasts_s(problem, moved) < INFERENCE.span_s or not times[0] < time < times[-1]:
                     continue
+                if span_s(problem, moved) > longest_s(problem, moved):
+                    continue
                 tried = fit(
                     problem,
                     replace_candidate(best.candidates, index, moved),
@@ -208,7 +286,10 @@ def refit_spans(problem: EstimationProblem, made: Fit) -> Fit:
             continue
         bare, begin = without(problem, made, i), starting_point(problem, made)
         linearisation = linearise(problem, bare, starting_point(problem, bare))
-        spans = [candidate, *promising_spans(problem, linearisation, candidate)]
+        spans = [
+            standing_out(problem, linearisation, candidate),
+            *promising_spans(problem, linearisation, candidate),
+        ]
         tried = [
             fit(
                 problem,

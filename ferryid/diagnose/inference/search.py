@@ -194,7 +194,8 @@ def _ranked_candidates(
     current = fit(problem, chosen.candidates, chosen.values)
     begin = starting_point(problem, current)
     linearisation = linearise(problem, current, begin)
-    found = over(partial(_best_fit, problem, current, begin, linearisation), candidates)
+    tried = over(partial(_best_fit, problem, current, begin, linearisation), candidates)
+    found = [one for one in tried if one is not None]
     found.sort(key=lambda one: -one.gain)
     fair = over(partial(_with_own_noise, problem), found[: INFERENCE.compared_candidates])
     return sorted([*fair, *found[INFERENCE.compared_candidates :]], key=lambda one: -one.gain)
@@ -207,8 +208,8 @@ def _with_own_noise(problem: EstimationProblem, one: ScoredCandidate) -> ScoredC
 
 def _best_fit(
     problem: EstimationProblem, current: Fit, begin: StartingPoint, linearisation: Linearisation, candidate: Candidate
-) -> ScoredCandidate:
-    """Return a candidate's best fit beside the current ones, over all spans where it can begin or end."""
+) -> ScoredCandidate | None:
+    """Return a candidate's best fit beside the current ones, over all spans where it can begin or end; None if nowhere."""
 
     def scored(made: Fit) -> ScoredCandidate:
         gain = made.evidence - current.evidence
@@ -228,9 +229,9 @@ def _best_fit(
         return scored(made)
 
     candidate = choose_parameters(problem, current, candidate)
-    whole = scored_fit(candidate)
+    throughout = [] if candidate.effect.passing else [scored_fit(candidate)]
     if not candidate.effect.onset:
-        return whole
+        return throughout[0]
     # The impulse of an onset shows within seconds of it only; what is changed from then on leads there.
     smooth = replace(candidate, effect=replace(candidate.effect, impulse=None))
     spans = [scored_fit(one) for one in promising_spans(problem, linearisation, smooth)]
@@ -242,8 +243,10 @@ def _best_fit(
         return scored(refine_span(problem, with_impulse.fit, index, begin, min(step, FIRST_TIME_STEP_S)))
 
     # Seconds matter: which of them is best shows when each has its own.
-    good = [one for one in spans if one.gain > max(whole.gain, 0.5 * INFERENCE.prior_odds)]
-    return max([whole, *(refined(one) for one in good)], key=lambda one: one.gain)
+    least = max([0.5 * INFERENCE.prior_odds, *(one.gain for one in throughout)])
+    return max(
+        [*throughout, *(refined(one) for one in spans if one.gain > least)], key=lambda one: one.gain, default=None
+    )
 
 
 def _round(found: Sequence[ScoredCandidate]) -> Round:

@@ -152,6 +152,12 @@ class InferenceThresholds:
         "least number of parts of a log between which an effect may begin or end",
         "convention: short logs are cut finer than by `span_s`, as an end that is off by seconds leaves an error",
     )
+    contrast: float = threshold(
+        4.0,
+        "times the log evidence elsewhere in the log",
+        "what counts against an effect that only passes, such as a push: its best evidence where it does not act",
+        "derived: evidence goes with the square of a force, and what is not twice as strong as all else like it is no event",
+    )
     fitted_spans: int = threshold(
         3,
         "spans",

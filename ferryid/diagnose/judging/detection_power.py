@@ -20,6 +20,7 @@ from ferryid.diagnose.inference.estimation import (
     effect_slopes,
     fitted_force_model,
 )
+from ferryid.diagnose.inference.onset_estimation import in_the_middle
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.experiment_design import OTHERWISE, SHOWS
 from ferryid.diagnose.judging.thresholds import JUDGING
@@ -81,6 +82,7 @@ def detection_powers(problem: EstimationProblem, kept: Fit, library: Sequence[Ca
         if candidate.key in taken or candidate.effect.id == HULL:
             continue
         size = np.array([one.size for one in candidate.parameters])
+        candidate = in_the_middle(problem, candidate)
         chance = 1.0
         for usual in _usual(candidate):
             there = problem.white(candidate.act(force_model, usual))

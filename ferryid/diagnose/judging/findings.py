@@ -177,7 +177,20 @@ def _estimates(problem: EstimationProblem, candidate: Candidate, kept: Fit, inde
         estimates[parameter.name] = Estimate(value, low, high, parameter.unit)
     for end in candidate.times:
         estimates[end.removesuffix("_s")] = _time(problem, kept, index, end)
+    if candidate.effect.passing:
+        estimates["duration"] = _duration(problem, estimates)
     return estimates
+
+
+def _duration(problem: EstimationProblem, estimates: Mapping[str, Estimate]) -> Estimate:
+    """Return how long an effect acted, from its times; an end of the log where it was not seen to begin, or to end."""
+    first, last = problem.windows.measurements.t[[0, -1]].tolist()
+    begun = estimates.get("onset", Estimate(first, first, first, "s"))
+    ended = estimates.get("offset", Estimate(last, last, last, "s"))
+    value = ended.value - begun.value
+    low = value - float(np.hypot(ended.value - ended.low, begun.high - begun.value))
+    high = value + float(np.hypot(ended.high - ended.value, begun.value - begun.low))
+    return Estimate(value, max(low, 0.0), high, "s")
 
 
 def _value(estimates: Mapping[str, Estimate], name: str) -> float | None:

@@ -15,7 +15,7 @@ from ferryid.diagnose.inference.estimation import (
     starting_point,
     without,
 )
-from ferryid.diagnose.inference.onset_estimation import is_brief
+from ferryid.diagnose.inference.onset_estimation import is_brief, linearise, passes, standing_out
 from ferryid.diagnose.inference.search import COARSE_ITERATIONS
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.thresholds import JUDGING
@@ -75,6 +75,8 @@ def compare_rivals(problem: EstimationProblem, kept: Fit, index: int, library: S
             replace(other, onset_s=candidate.onset_s, offset_s=candidate.offset_s) if other.effect.onset else other
         )
         stand_in = choose_parameters(problem, bare, refit_spans)
+        if other.effect.passing:
+            stand_in = standing_out(problem, linearise(problem, bare, begin), stand_in)
         start = [*bare.values, stand_in.start]
         made = fit(
             problem,
@@ -89,7 +91,10 @@ def compare_rivals(problem: EstimationProblem, kept: Fit, index: int, library: S
         made = fit(problem, one.fit.candidates, one.fit.values, begin=starting_point(problem, one.fit))
         return RivalFit(one.candidate, made, made.evidence - kept.evidence)
 
-    rivals = over(instead, [other for other in library if other.key not in taken])
+    others = [other for other in library if other.key not in taken]
+    # What only passes explains nothing that lasts.
+    others = [one for one in others if not one.effect.passing or passes(problem, replace(candidate, effect=one.effect))]
+    rivals = over(instead, others)
     rivals.sort(key=lambda one: -one.gain)
     # How far behind the others are does not matter to the digit.
     rivals[: JUDGING.fitted_rivals] = over(settled_in, rivals[: JUDGING.fitted_rivals])

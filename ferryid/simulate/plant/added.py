@@ -23,8 +23,8 @@ class Added(NamedTuple):
     """Q effects for compiled code.
 
     `load` and `thrust` (Q,) are addresses of functions, 0 for none, `thruster` (Q,) says on which a change of thrust acts,
-    `values` (Q, m) are their parameters, and `parameters` (Q,) the addresses of its rows. Written anew are `acts` (Q,), 1 for
-    those that act in the present step, and `force` (3,) at the address `force_at`, by every load.
+    `values` (Q, m) are their parameters and constants, and `parameters` (Q,) the addresses of its rows. Written anew are `acts`
+    (Q,), 1 for those that act in the present step, and `force` (3,) at the address `force_at`, by every load.
     """
 
     load: Ints
@@ -41,10 +41,17 @@ def build_added(added: tuple[AddedEffect, ...], profile: Profile) -> Added:
     """Return effects for compiled code; a parameter that is not given is neutral."""
     names = [actuator.name for actuator in profile.actuators]
     parameters = [effects()[one.effect].parameters_of(profile) for one in added]
-    values = np.zeros((len(added), max([len(each) for each in parameters], default=0)))
-    for row, one, own in zip(values, added, parameters, strict=True):
-        row[: len(own)] = [one.values.get(each.name, each.neutral) for each in own]
     hooks = [effects()[one.effect].simulated for one in added]
+    every = [
+        [
+            *(one.values.get(each.name, each.neutral) for each in own),
+            *(hook.constants(profile, one.thruster) if hook else ()),
+        ]
+        for one, own, hook in zip(added, parameters, hooks, strict=True)
+    ]
+    values = np.zeros((len(added), max(map(len, every), default=0)))
+    for row, numbers in zip(values, every, strict=True):
+        row[: len(numbers)] = numbers
     force = np.zeros(3)
     return Added(
         load=_addresses(load_address(one.load) if one and one.load else 0 for one in hooks),
