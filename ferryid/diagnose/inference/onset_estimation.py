@@ -74,7 +74,7 @@ def promising_spans(problem: EstimationProblem, linearisation: Linearisation, ca
     The log is cut into parts; what a candidate adds in a part is linear in its parameters there, and what it adds in a span is
     the sum of the parts'. So one set of cross-products holds the evidence of every span, hull and other effects refitted.
 
-    What only passes has to stand out: see `_elsewhere`.
+    What only passes has to stand out: see `stands_out`.
     """
     edges, a, b, gain = _scan(problem, linearisation, candidate)
     parts = len(edges) - 1
@@ -82,47 +82,37 @@ def promising_spans(problem: EstimationProblem, linearisation: Linearisation, ca
     for k in np.argsort(-gain).tolist():
         if gain[k] <= 0.0 or len(found) == INFERENCE.fitted_spans:
             break
+        i, j = int(a[k]), int(b[k])
         # A neighbour tells nothing new.
-        if all(max(abs(int(a[k]) - i), abs(int(b[k]) - j)) > 1 for i, j in found):
-            found.append((int(a[k]), int(b[k])))
+        if any(max(abs(i - other[0]), abs(j - other[1])) <= 1 for other in found):
+            continue
+        if not candidate.effect.passing or _is_event(float(gain[k]), a, b, gain, i, j):
+            found.append((i, j))
     return [
-        _standing_out(
-            problem,
-            replace(
-                candidate, onset_s=float(edges[i]) if i > 0 else 0.0, offset_s=float(edges[j]) if j < parts else inf
-            ),
-            _elsewhere(a, b, gain, i, j),
-        )
+        replace(candidate, onset_s=float(edges[i]) if i > 0 else 0.0, offset_s=float(edges[j]) if j < parts else inf)
         for i, j in found
     ]
 
 
-def standing_out(problem: EstimationProblem, linearisation: Linearisation, candidate: Candidate) -> Candidate:
-    """Return a candidate in its span with the prior odds by how much it stands out there; unchanged if it does not pass."""
+def stands_out(problem: EstimationProblem, linearisation: Linearisation, candidate: Candidate) -> bool:
+    """Tell whether a candidate that only passes is an event in its span, beside a fit that lacks it; True for any other."""
     if not candidate.effect.passing:
-        return candidate
+        return True
     edges, a, b, gain = _scan(problem, linearisation, candidate)
-    i = int(np.searchsorted(edges, candidate.onset_s, side="right")) - 1
-    j = int(np.searchsorted(edges, min(candidate.offset_s, edges[-1])))
-    return _standing_out(problem, candidate, _elsewhere(a, b, gain, max(i, 0), j))
+    i = int(np.argmin(np.abs(edges - candidate.onset_s)))
+    j = int(np.argmin(np.abs(edges - min(candidate.offset_s, edges[-1]))))
+    near = gain[(np.abs(a - i) <= 1) & (np.abs(b - j) <= 1)]
+    return _is_event(float(near.max(initial=-inf)), a, b, gain, i, j)
 
 
-def _standing_out(problem: EstimationProblem, candidate: Candidate, elsewhere: float) -> Candidate:
-    """Return a passing candidate with what counts against it from elsewhere in the log [nat]; any other as it is."""
-    if not candidate.effect.passing:
-        return candidate
-    rarity = candidate.effect.log_rarity(problem.plain.measurements.profile)
-    return replace(candidate, log_alternatives=rarity + INFERENCE.contrast * elsewhere)
+def _is_event(own: float, a: Ints, b: Ints, gain: Floats, i: int, j: int) -> bool:
+    """Tell whether the evidence of a span from part i up to j is far above that of all that neither overlap nor touch it.
 
-
-def _elsewhere(a: Ints, b: Ints, gain: Floats, i: int, j: int) -> float:
-    """Return the most evidence that spans would have which neither overlap nor touch the one from part i up to j.
-
-    Where nothing pushes, that is what unsteady forces, a hull that is off and noise make of a push. One is an event only where
-    it is far stronger than all of these, and one that came twice alike is no event but something unsteady.
+    Where nothing pushes, those have what unsteady forces, a hull that is off and noise make of a push. What is no stronger is
+    one of these, and what came twice alike is no event but something unsteady.
     """
     apart = (b < i) | (a > j)
-    return max(0.0, float(gain[apart].max(initial=0.0)))
+    return own > INFERENCE.contrast * float(gain[apart].max(initial=0.0))
 
 
 def _scan(
@@ -286,10 +276,7 @@ def refit_spans(problem: EstimationProblem, made: Fit) -> Fit:
             continue
         bare, begin = without(problem, made, i), starting_point(problem, made)
         linearisation = linearise(problem, bare, starting_point(problem, bare))
-        spans = [
-            standing_out(problem, linearisation, candidate),
-            *promising_spans(problem, linearisation, candidate),
-        ]
+        spans = [candidate, *promising_spans(problem, linearisation, candidate)]
         tried = [
             fit(
                 problem,

@@ -29,6 +29,7 @@ from ferryid.diagnose.inference.onset_estimation import (
     promising_spans,
     refine_span,
     refit_spans,
+    stands_out,
 )
 from ferryid.diagnose.inference.stochastic_disturbance import DisturbanceState, fit_disturbances
 from ferryid.diagnose.inference.thresholds import INFERENCE
@@ -281,7 +282,12 @@ def is_negligible(problem: EstimationProblem, made: Fit, index: int = -1) -> boo
 
 
 def prune(problem: EstimationProblem, chosen: Fit) -> Fit:
-    """Drop one by one what the others explain as well without it."""
+    """Drop one by one what the others explain as well without it, and what passes without being an event beside them."""
+    for key in [candidate.key for candidate in chosen.candidates if candidate.effect.passing]:
+        index = [candidate.key for candidate in chosen.candidates].index(key)
+        bare = without(problem, chosen, index)
+        if not stands_out(problem, linearise(problem, bare, starting_point(problem, bare)), chosen.candidates[index]):
+            chosen = bare
     while chosen.candidates:
         fewer = over(partial(without, problem, chosen), range(len(chosen.candidates)))
         best = max(over(partial(refit_with_own_noise, problem), fewer), key=lambda one: one.evidence)

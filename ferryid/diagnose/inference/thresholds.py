@@ -155,7 +155,7 @@ class InferenceThresholds:
     contrast: float = threshold(
         4.0,
         "times the log evidence elsewhere in the log",
-        "what counts against an effect that only passes, such as a push: its best evidence where it does not act",
+        "evidence that an effect which only passes, such as a push, must have",
         "derived: evidence goes with the square of a force, and what is not twice as strong as all else like it is no event",
     )
     fitted_spans: int = threshold(

@@ -231,6 +231,9 @@ def placebos(problem: EstimationProblem, candidate: Candidate, values: Floats) -
     candidate = replace(candidate, parameters=parameters)
     seconds = float(problem.windows.measurements.t[-1] - problem.windows.measurements.t[0])
     made = {f"{share * seconds:.0f} s late": _shifted(candidate, share) for share in JUDGING.placebo_shifts}
+    if candidate.effect.passing:
+        # While it acts the heading hardly turns: on a mirrored one the same force only points elsewhere.
+        return made
     mirrored = _mirrored(candidate)
     true = candidate.act(problem.plain, values)
     wrong = mirrored.act(problem.plain, values)

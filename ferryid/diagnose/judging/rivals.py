@@ -10,12 +10,13 @@ from ferryid.diagnose.inference.estimation import (
     Candidate,
     EstimationProblem,
     Fit,
+    StartingPoint,
     choose_parameters,
     fit,
     starting_point,
     without,
 )
-from ferryid.diagnose.inference.onset_estimation import is_brief, linearise, passes, standing_out
+from ferryid.diagnose.inference.onset_estimation import is_brief, linearise, passes, stands_out
 from ferryid.diagnose.inference.search import COARSE_ITERATIONS
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.thresholds import JUDGING
@@ -75,8 +76,6 @@ def compare_rivals(problem: EstimationProblem, kept: Fit, index: int, library: S
             replace(other, onset_s=candidate.onset_s, offset_s=candidate.offset_s) if other.effect.onset else other
         )
         stand_in = choose_parameters(problem, bare, refit_spans)
-        if other.effect.passing:
-            stand_in = standing_out(problem, linearise(problem, bare, begin), stand_in)
         start = [*bare.values, stand_in.start]
         made = fit(
             problem,
@@ -92,8 +91,7 @@ def compare_rivals(problem: EstimationProblem, kept: Fit, index: int, library: S
         return RivalFit(one.candidate, made, made.evidence - kept.evidence)
 
     others = [other for other in library if other.key not in taken]
-    # What only passes explains nothing that lasts.
-    others = [one for one in others if not one.effect.passing or passes(problem, replace(candidate, effect=one.effect))]
+    others = [one for one in others if _may_stand_in(problem, bare, begin, candidate, one)]
     rivals = over(instead, others)
     rivals.sort(key=lambda one: -one.gain)
     # How far behind the others are does not matter to the digit.
@@ -101,3 +99,13 @@ def compare_rivals(problem: EstimationProblem, kept: Fit, index: int, library: S
     rivals.sort(key=lambda one: -one.gain)
     against = none + sum(exp(min(one.gain, 50.0)) for one in rivals)
     return RivalComparison(tuple(rivals), 1.0 / (1.0 + against))
+
+
+def _may_stand_in(
+    problem: EstimationProblem, bare: Fit, begin: StartingPoint, candidate: Candidate, other: Candidate
+) -> bool:
+    """Tell whether another may stand in a candidate's place: what only passes explains nothing that lasts or comes often."""
+    if not other.effect.passing:
+        return True
+    there = replace(other, onset_s=candidate.onset_s, offset_s=candidate.offset_s)
+    return passes(problem, there) and stands_out(problem, linearise(problem, bare, begin), there)
