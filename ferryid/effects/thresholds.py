@@ -127,16 +127,10 @@ class EffectThresholds:
         "convention: a third, so that most of the log is without it",
     )
     least_ventilation: float = threshold(
-        0.05,
+        0.1,
         "of the thrust",
         "smaller losses by ventilation are void, intervals no narrower",
-        "convention: 5 %, at high loading only",
-    )
-    ventilated: float = threshold(
-        0.8,
-        "of the thrust",
-        "largest share of its force that a ventilated propeller keeps for it to be no error of the thrust curve",
-        "convention: curves are off by some ten per cent near their end; measured losses are 20 % to 80 %",
+        "convention: 10 %; thrust curves are no better near their end, and measured losses are 20 % to 80 %",
     )
     slowest_waves: float = threshold(
         0.25,

@@ -112,13 +112,6 @@ def says(values: Values, instance: str | None) -> str:
     )
 
 
-def doubt(values: Values) -> str:
-    """Return why a small loss may be none: a thrust curve is not known so well near its end."""
-    if values["factor"] <= EFFECTS.ventilated:
-        return ""
-    return f"a loss of less than {100.0 * (1.0 - EFFECTS.ventilated):.0f} % may be an error of the thrust curve near its end"
-
-
 def regressor(force_model: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return the loading: the force is lost above one."""
     k = index_of(force_model, instance)
@@ -137,7 +130,6 @@ EFFECT = Effect(
     cannot_be_of=cannot_be_of,
     vessel=True,
     regressor=regressor,
-    doubt=doubt,
     negligible=EFFECTS.least_ventilation,
     simulated=Simulated(thrust=change, constants=constants),
 )
