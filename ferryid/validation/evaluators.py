@@ -16,6 +16,9 @@ from ferryid.vessel.profile import Profile
 RIVALS_EVERY = 5
 """Rivals run on one log in so many: they take longer than a diagnosis. The numbers of cases are random."""
 
+CLEAN_SPAN_S = (100.0, 200.0)
+"""When what only passes is estimated in a clean log, to learn what it gains by chance."""
+
 
 def pipeline() -> Pipeline:
     """Return what a validation run is put together from."""
@@ -79,8 +82,14 @@ def _every_effect(profile: Profile) -> list[Truth]:
     from ferryid.effects import effects
 
     library = effects()
+
+    def truth(name: str, instance: str | None) -> Truth:
+        # What only passes cannot act all along.
+        times = CLEAN_SPAN_S if name in library and library[name].passing else (None, None)
+        return Truth(name, instance, {}, *times)
+
     return [
-        Truth(name, instance, {})
+        truth(name, instance)
         for name in plant_effects()
         for instance in (library[name].instances(profile) if name in library else (None,))
     ]

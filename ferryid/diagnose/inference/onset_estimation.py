@@ -122,7 +122,10 @@ def _scan(
     edges = _edges(problem, candidate)
     parts = len(edges) - 1
     a, b = np.triu_indices(parts + 1, 1)
-    tried = ((a > 0) | (b < parts)) & (edges[b] - edges[a] <= longest_s(problem, candidate))
+    tried = (a > 0) | (b < parts)
+    if candidate.effect.passing:
+        lasts = edges[b] - edges[a]
+        tried &= (lasts >= shortest_s(problem, candidate)) & (lasts <= longest_s(problem, candidate))
     a, b = a[tried], b[tried]
     if not len(a):
         return edges, a, b, np.empty(0)
@@ -130,6 +133,12 @@ def _scan(
     gain = _gains(G, g, a, b, candidate)
     gain -= ((a > 0).astype(np.float64) + (b < parts)) * log(len(problem.windows.starts))
     return edges, a, b, gain
+
+
+def shortest_s(problem: EstimationProblem, candidate: Candidate) -> float:
+    """Return for how many seconds of data a candidate acts at least; what passes faster may be an error of the navigation."""
+    window_s = len(problem.windows.weight) * problem.windows.measurements.step_s
+    return max(INFERENCE.span_s, INFERENCE.passing_windows * window_s) if candidate.effect.passing else INFERENCE.span_s
 
 
 def longest_s(problem: EstimationProblem, candidate: Candidate) -> float:
@@ -253,7 +262,7 @@ def refine_span(
             middle = getattr(best.candidates[index], end)
             for time in (middle - step, middle + step):
                 moved = best.candidates[index].moved(end, time)
-                if lasts_s(problem, moved) < INFERENCE.span_s or not times[0] < time < times[-1]:
+                if lasts_s(problem, moved) < shortest_s(problem, moved) or not times[0] < time < times[-1]:
                     continue
                 if span_s(problem, moved) > longest_s(problem, moved):
                     continue

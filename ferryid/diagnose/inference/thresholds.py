@@ -152,6 +152,12 @@ class InferenceThresholds:
         "least number of parts of a log between which an effect may begin or end",
         "convention: short logs are cut finer than by `span_s`, as an end that is off by seconds leaves an error",
     )
+    passing_windows: float = threshold(
+        2.5,
+        "windows' lengths",
+        "shortest span of an effect that only passes, such as a push",
+        "convention: half a held-out block, 20 s for a vessel of 5 m; a position that is off for a moment looks like a push, too",
+    )
     contrast: float = threshold(
         4.0,
         "times the log evidence elsewhere in the log",

@@ -53,7 +53,7 @@ def changes(
     t
         Time [s].
     y, dy
-        States and their derivatives, shape (12 + 5 k,).
+        States and their derivatives, shape (12 + 6 k,).
     order
         Of the thrusters, shape (k, 2).
     flow, air

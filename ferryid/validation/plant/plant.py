@@ -22,7 +22,7 @@ from ferryid.validation.plant.thrusters import thruster_constants
 from ferryid.validation.plant.vessels import Vessel
 
 Load = Callable[[float, Floats, Floats], None]
-"""``load(t, y, out)`` writes a load [N, N·m], shape (6,), at a time [s] and the states of the body, shape (12 + 5 k,)."""
+"""``load(t, y, out)`` writes a load [N, N·m], shape (6,), at a time [s] and the states of the body, shape (12 + 6 k,)."""
 Report = Callable[[Floats], None]
 """``report(pose)`` changes what the navigation reports: north, east, heading, surge, sway, yaw rate, shape (6,)."""
 Encoder = Callable[[Floats], Floats]

@@ -16,8 +16,8 @@ from ferryid.compiled import compiled
 from ferryid.types import Floats
 from ferryid.validation.plant.vessels import Vessel
 
-STATES = 5
-"""Of a thruster: speed [rpm], angle [rad], race [rpm], and two of a force that is late [N]."""
+STATES = 6
+"""Of a thruster: speed [rpm], angle [rad], race [rpm], two of a force that is late [N], and the share of its disc in air."""
 LAG_RATE = 2.0
 """Of each of two stages of a force that is late, over the rate of both together."""
 MOTOR_S, RATE_S = 0.25, 0.9
@@ -29,6 +29,12 @@ RACE_S = 0.08
 """Time in which it forms at full speed; longer at less."""
 CORNER = 30.0
 """Power with which a thrust bends into a limit of its motor's current: 2 % are missing at the limit."""
+FREE_OF_AIR = (0.0, 1e9)
+"""Share of the force that air takes, and share of the most speed above which it is drawn, of a thruster that draws none."""
+DRAWN_S, WASHED_S = 1.5, 0.6
+"""Time constants with which air gathers in a propeller's disc, and with which it is washed out."""
+AIR_BAND, AIR_INFLOW = 0.1, 0.1
+"""Shares of the most speed: over which the disc fills, and by how much later it does at an inflow of 1 m/s."""
 AT_SPEED = 0.6
 """Share of the most speed at which the loss to inflow is defined."""
 
@@ -37,7 +43,7 @@ class ThrusterConstants(NamedTuple):
     """Thrusters, ready for compiled code: places (k, 3), coefficients and most speeds (k,), losses, when a gain holds.
 
     `band` are speeds of the race ahead and astern below which there is no thrust [rpm], `limit` the most thrust either way [N],
-    shape (k, 2).
+    and `air` the share of the thrust that air takes and the share of the most speed above which it is drawn, shape (k, 2).
     """
 
     place: Floats
@@ -53,6 +59,7 @@ class ThrusterConstants(NamedTuple):
     interaction: float
     band: Floats
     limit: Floats
+    air: Floats
 
 
 def thruster_constants(vessel: Vessel) -> ThrusterConstants:
@@ -72,6 +79,7 @@ def thruster_constants(vessel: Vessel) -> ThrusterConstants:
         interaction=0.0,
         band=np.zeros((len(every), 2)),
         limit=np.full((len(every), 2), 1e9),
+        air=np.array([FREE_OF_AIR for _ in every]),
     )
 
 
@@ -95,7 +103,7 @@ def thrust(
     t
         Time [s].
     state, change
-        `STATES` of each, and their derivatives, shape (k, 5).
+        `STATES` of each, and their derivatives, shape (k, 6).
     nu
         Velocity through the water, shape (6,).
     order
@@ -127,6 +135,13 @@ def thrust(
         # Thrust falls linearly with the advance ratio: with n times inflow.
         push -= bites * gear.inflow * coefficient * AT_SPEED * most * abs(n) * along
         push = _limited(gear, i, push)
+        # Loading grows with speed and falls with the inflow; air comes slower than it goes.
+        full = (abs(n) / most - gear.air[i, 1] - AIR_INFLOW * abs(along)) / AIR_BAND
+        full = min(max(full, 0.0), 1.0)
+        change[i, 5] = (full - state[i, 5]) / (DRAWN_S if full > state[i, 5] else WASHED_S)
+        kept = 1.0 - gear.air[i, 0] * state[i, 5]
+        push *= kept
+        parts[i, 1] *= kept
         if gear.gain_span[0] <= t < gear.gain_span[1]:
             push *= gear.gain[i]
             parts[i, 1] *= gear.gain[i]

@@ -39,7 +39,7 @@ class Trial:
     reported
         North, east [m], heading [rad], surge, sway [m/s] and yaw rate [rad/s] as the navigation reports them, shape (n, 6).
     states
-        True states: see `ferryid.validation.plant.motion`, shape (n, 12 + 5 k).
+        True states: see `ferryid.validation.plant.motion`, shape (n, 12 + 6 k).
     orders
         Speed [rpm] and angle [rad] ordered of each thruster, shape (n, k, 2).
     wanted
