@@ -77,7 +77,9 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
 
 def cannot(measurements: Measurements) -> str:
     """Return why the measurements cannot show it of any actuator."""
-    return "" if instances(measurements.profile) else "no actuator has a thrust curve with an end and an unmeasured force"
+    return (
+        "" if instances(measurements.profile) else "no actuator has a thrust curve with an end and an unmeasured force"
+    )
 
 
 def cannot_be_of(measurements: Measurements, instance: str | None) -> str:

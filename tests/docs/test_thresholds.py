@@ -50,6 +50,8 @@ NO_DECISION = {
         diagnose.inference.group_differences SCATTERS
         effects.shallow_water EDGE_M
         effects.thruster_interaction SHARPNESS
+        effects.external_push USUAL_MPS2 ARM
+        effects.ventilation WIDTH
         effects.waves USUAL_HZ USUAL_M
         effects.wind COEFFICIENTS
     """,

@@ -50,9 +50,13 @@ MODERATE = {
     "dead_band": {"ahead": 200.0, "astern": 0.0},
     "astern_asymmetry": {"factor": 0.8},
     "thrust_saturation": {"ahead": 160.0, "astern": 304.1227},
+    "external_push": {"north": 60.0, "east": -50.0, "moment": 60.0},
+    "ventilation": {"factor": 0.6, "from": 40.0},
     "shallow_water": {"factor": 1.6, "south": 12.0, "north": 34.0, "west": -18.0, "east": 4.0, "added_mass": 0.0},
 }
 """Where one size of every parameter would be gross, or no place for a ferry."""
+SPANS = {"external_push": {"onset": 200.0, "offset": 260.0}}
+"""When those act that only pass [s]."""
 
 
 def inline(value: Any) -> str:
@@ -108,11 +112,14 @@ def test_effect_is_found_where_it_acts(name: str, tmp_path: Path) -> None:
     instance = effect.instances(vessel)[-1]
     parameters = effect.parameters_of(vessel)
     truth = moderate(name)
-    result = found_in(effect.scenario(truth, instance), 3, tmp_path, DWELL_S.get(name, BRIEF_S), vessel)
+    span = SPANS.get(name, {})
+    result = found_in(effect.scenario({**truth, **span}, instance), 3, tmp_path, DWELL_S.get(name, BRIEF_S), vessel)
     assert [(one.effect.id, one.instance) for one in result.fit.candidates[:1]] == [(name, instance)]
     assert effect.says(truth, instance)
     for one, value, error in zip(parameters, result.fit.values[0], result.fit.errors(0), strict=True):
         assert abs(value - truth[one.name]) < max(4.0 * error, 0.15 * one.size), one.name
+    for end, when in span.items():
+        assert abs(getattr(result.fit.candidates[0], f"{end}_s") - when) < 2.0
 
 
 @pytest.mark.parametrize("name", RELATED)

@@ -43,9 +43,10 @@ VESSEL = {
     "thruster_gain",
     "thruster_interaction",
     "thruster_lag",
+    "ventilation",
     "yaw_rate_scale",
 }
-CONDITIONS = {"current", "gusts", "mooring", "payload", "shallow_water", "time_delay", "waves", "wind"}
+CONDITIONS = {"current", "external_push", "gusts", "mooring", "payload", "shallow_water", "time_delay", "waves", "wind"}
 
 
 def stored(effect: str, instance: str | None = None, *, onset_s: float | None = None, **values: float) -> StoredEffect:

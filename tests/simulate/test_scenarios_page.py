@@ -111,7 +111,9 @@ def test_every_effect_that_can_be_added_stands_there_with_its_parameters() -> No
             units.setdefault(one.name, []).append(one.unit.replace("-", ""))
             assert f"`{effect}`" in rows[one.name][4]
     assert set(rows) == {"effect", "thruster", "from_s", "until_s", *units}
-    assert {name: rows[name][2] for name in units} == {name: " or ".join(some) for name, some in units.items()}
+    assert {name: rows[name][2] for name in units} == {
+        name: " or ".join(dict.fromkeys(some)) for name, some in units.items()
+    }
 
 
 def test_every_path_and_factor_is_named() -> None:

@@ -19,7 +19,7 @@ from ferryid.vessel import load_profile
 CONTRACT = (
     "wind gusts current waves payload fouling thruster_gain azimuth_offset azimuth_resolution thruster_lag thrust_inflow_loss "
     "thruster_interaction mooring shallow_water time_delay lever_arm heading_bias yaw_rate_scale hull_parameters "
-    "dead_band astern_asymmetry thrust_saturation"
+    "dead_band astern_asymmetry thrust_saturation external_push ventilation"
 )
 
 

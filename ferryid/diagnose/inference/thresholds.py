@@ -156,7 +156,7 @@ class InferenceThresholds:
         2.5,
         "windows' lengths",
         "shortest span of an effect that only passes, such as a push",
-        "convention: half a held-out block, 20 s for a vessel of 5 m; a position that is off for a moment looks like a push, too",
+        "convention: half a held-out block, 20 s for a vessel of 5 m; a position that is off for a moment looks alike",
     )
     contrast: float = threshold(
         4.0,

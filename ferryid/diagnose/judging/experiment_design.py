@@ -13,6 +13,8 @@ STRAIGHT = "long straight runs at constant speed on opposite courses"
 STAIRCASE = "each thruster alone in small steps of its order from full ahead through zero to full astern, each held"
 BOTH_WAYS = "each thruster alone at the same orders ahead and astern, at rest"
 FULL = "each thruster alone in steps from half to full force, at rest"
+QUIET = "the same manoeuvres again, with nobody and nothing touching the hull, and a note of the times at which it is touched"
+LOADED = "each thruster alone in steps from half to full force and back, at rest, light and deep, in still water"
 ACCELERATE = "hard acceleration and turning at low speed, and long straight runs at constant speed"
 
 PAIRS: tuple[tuple[frozenset[str], str], ...] = (
@@ -100,6 +102,23 @@ PAIRS: tuple[tuple[frozenset[str], str], ...] = (
     (frozenset({"thrust_saturation"}), FULL),
     (frozenset({"thruster_gain"}), SINGLE),
     (frozenset({"azimuth_offset"}), SINGLE),
+    (frozenset({"external_push", "gusts"}), f"a wind sensor aboard, or {QUIET}"),
+    (frozenset({"external_push", "wind"}), f"a wind sensor aboard, or {QUIET}"),
+    (frozenset({"external_push", "mooring"}), f"station keeping at places far apart while it acts, or {QUIET}"),
+    (frozenset({"external_push", "current"}), QUIET),
+    (frozenset({"external_push", "payload"}), f"hard accelerations while it is aboard, or {QUIET}"),
+    (frozenset({"external_push", "thruster_gain"}), f"drifting with the thrusters off while it acts, or {QUIET}"),
+    (frozenset({"external_push", "waves"}), QUIET),
+    (frozenset({"ventilation", "thruster_gain"}), LOADED),
+    (frozenset({"ventilation", "thrust_inflow_loss"}), f"{LOADED}, and half force at full speed"),
+    (frozenset({"ventilation", "thrust_saturation"}), LOADED),
+    (frozenset({"ventilation", "astern_asymmetry"}), f"{LOADED}, ahead and astern"),
+    (frozenset({"ventilation", "thruster_interaction"}), LOADED),
+    (frozenset({"ventilation", "thruster_lag"}), LOADED),
+    (frozenset({"ventilation", "hull_parameters"}), COAST),
+    (frozenset({"ventilation", "fouling"}), COAST),
+    (frozenset({"ventilation", "payload"}), f"{LOADED}, and hard accelerations at half force"),
+    (frozenset({"ventilation"}), LOADED),
 )
 
 TURNING = "a slow turn on the spot through all headings"
@@ -116,6 +135,8 @@ SHOWS = {
     "dead_band": STAIRCASE,
     "astern_asymmetry": BOTH_WAYS,
     "thrust_saturation": FULL,
+    "ventilation": LOADED,
+    "external_push": QUIET,
     "azimuth_resolution": SINGLE,
     "thruster_lag": STEPS,
     "time_delay": STEPS,
@@ -138,6 +159,8 @@ SENSORS = {
     "thruster_lag": "feedback of each thruster's speed",
     "time_delay": "time stamps of one clock for navigation and thrusters",
     "mooring": "a load cell in the line",
+    "ventilation": "feedback of each thruster's torque",
+    "external_push": "a camera or a note of when the hull is touched",
     "shallow_water": "an echo sounder",
     "lever_arm": "a surveyed place of the antenna",
     "heading_bias": "a second antenna or a compass that was swung",

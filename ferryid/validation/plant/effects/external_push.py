@@ -34,7 +34,7 @@ def sample(size: float, vessel: Vessel, rng: np.random.Generator, span: Span) ->
     begin = float(rng.uniform(0.2, 0.7)) * whole
     end = begin + float(rng.uniform(60.0, 150.0))
     north, east = random_vector(size * vessel.mass, rng)
-    place = float(rng.uniform(-0.1, 0.1)) * vessel.length
+    place = float(rng.uniform(-0.03, 0.03)) * vessel.length
     return Injection({"push": (north, east, place), "push_span": (begin, end)}, (Truth(ID, None, {}, begin, end),))
 
 
