@@ -25,7 +25,7 @@ FEWEST = 6
 CHANCE = 0.01
 """Of shuffled dates to look as much like a trend, above which none is told."""
 SHUFFLES = 4000
-NO_TREND = ("onset", "offset")
+NO_TREND = ("onset", "offset", "duration")
 """Parameters that are times within a log."""
 WITH_THE_REST = {"gusts": ("time_constant",), "waves": ("time_constant", "peak_frequency")}
 """Parameters without a meaning where the effect is absent, beside those of effects that say so themselves."""
