@@ -84,5 +84,6 @@ EFFECT = Effect(
     onset=True,
     longest_s=EFFECTS.longest_push,
     regressor=regressor,
+    formula_error=EFFECTS.load_error,
     simulated=Simulated(load),
 )

@@ -44,7 +44,7 @@ class EffectThresholds:
     load_error: float = threshold(
         0.05,
         "of what the effect changes",
-        "the same of a wind's load, of a mooring's pull and of the end of a dead band",
+        "the same of a wind's load, of a mooring's pull, of a push from outside and of the end of a dead band",
         "convention: half of `formula_error`; the wind's load has factors of its own beside it",
     )
     definition_error: float = threshold(

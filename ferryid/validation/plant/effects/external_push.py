@@ -26,13 +26,14 @@ ID = "external_push"
 
 
 def sample(size: float, vessel: Vessel, rng: np.random.Generator, span: Span) -> Injection:
-    """Return a push that gives the vessel this acceleration, for 60 to 150 s in the midst of the log.
+    """Return a push that gives the vessel this acceleration, for 90 to 180 s in the midst of the log.
 
+    Shorter ones are hints by rule, as nothing can be held out of them.
     The moment is not constant while the vessel turns: what it is on average is measured in the trial.
     """
     whole = duration_s("calibration")
     begin = float(rng.uniform(0.2, 0.7)) * whole
-    end = begin + float(rng.uniform(60.0, 150.0))
+    end = begin + float(rng.uniform(90.0, 180.0))
     north, east = random_vector(size * vessel.mass, rng)
     place = float(rng.uniform(-0.03, 0.03)) * vessel.length
     return Injection({"push": (north, east, place), "push_span": (begin, end)}, (Truth(ID, None, {}, begin, end),))
