@@ -168,8 +168,8 @@ class Effect:
     changes_hull
         True where the effect changes how the hull's coefficients act: masses, damping, the flow.
     piecewise
-        True where a parameter is the end of a range, so that the slope where a search begins leads a part of the way only, and a
-        fit that ranks it among others takes more steps.
+        True where a parameter is the end of a range, so that the slope where a search begins leads a part of the way only, and
+        a fit that ranks it among others takes more steps.
     profiled
         Parameter that others trade with, along which the posterior of an effect that acts all along is followed; empty where
         its curvature tells all.

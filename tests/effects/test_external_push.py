@@ -71,13 +71,13 @@ def test_it_never_acts_all_along_and_others_may() -> None:
 def test_a_moderate_push_is_a_hand_on_a_ferry_and_grows_with_the_mass() -> None:
     north, east, moment = PUSH.parameters_of(FERRY)
     assert (north.unit, east.unit, moment.unit) == ("N", "N", "N·m")
-    assert north.size == east.size == pytest.approx(90.0)
+    assert north.size == east.size == pytest.approx(0.05 * 1670.0)
     heavy = replace(FERRY, hull=replace(FERRY.hull, mass_kg=3.0 * FERRY.hull.mass_kg))
-    assert PUSH.parameters_of(heavy)[0].size == pytest.approx(270.0)
+    assert PUSH.parameters_of(heavy)[0].size == pytest.approx(3.0 * 0.05 * 1670.0)
     assert {one.neutral for one in (north, east, moment)} == {0.0}
 
 
-def test_it_is_told_by_where_it_pushes_to() -> None:
+def test_the_sentence_names_the_bearing_it_pushes_towards() -> None:
     says = PUSH.says({"north": 0.0, "east": 50.0, "moment": -12.0}, None)
     assert "50 N towards 90 deg (east)" in says
     assert "-12 N·m" in says

@@ -23,7 +23,7 @@ from scipy.spatial.distance import squareform
 from ferryid.diagnose.judging.campaign import JudgedCampaign
 from ferryid.diagnose.judging.experiment_design import SENSORS, manoeuvre
 from ferryid.diagnose.judging.judge import JudgedLog
-from ferryid.diagnose.judging.responses import HULL, ROUNDING, Key, Responses, responses, together
+from ferryid.diagnose.judging.responses import ROUNDING, Key, Responses, has_response, responses, together
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.types import Floats
@@ -229,7 +229,7 @@ def _responses(log: JudgedLog) -> Responses:
     if estimated.baseline.updates_model:
         return responses(estimated.problem, log.base)
     # The neutral values are those of the simulation that the recording is compared with.
-    return responses(estimated.problem, log.base, [one for one in log.selected.steady if one.effect.id != HULL])
+    return responses(estimated.problem, log.base, [one for one in log.selected.steady if has_response(one)])
 
 
 def likeness_as_json(found: Likeness) -> dict[str, Any]:

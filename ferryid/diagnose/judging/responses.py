@@ -59,15 +59,18 @@ class Responses:
 
 
 def candidates_of(problem: EstimationProblem) -> list[Candidate]:
-    """Return the effects that have a response: those that a log can show, without what comes and goes by chance.
+    """Return the effects that have a response, of those that a log can show."""
+    return [one for one in list_candidates(problem.plain.measurements)[0] if has_response(one)]
 
-    Of that a force model holds no force; it is a state of the filter.
+
+def has_response(candidate: Candidate) -> bool:
+    """Tell whether an effect has a response of its own before anything is fitted.
+
+    Of what comes and goes by chance a force model holds no force: it is a state of the filter. What only passes has one, but
+    when it acts is not known beforehand, and at another time it looks like another effect.
     """
-    return [
-        one
-        for one in list_candidates(problem.plain.measurements)[0]
-        if one.effect.unsteady is None and one.effect.id != HULL
-    ]
+    effect = candidate.effect
+    return effect.unsteady is None and not effect.passing and effect.id != HULL
 
 
 def responses(problem: EstimationProblem, base: Fit, candidates: Sequence[Candidate] | None = None) -> Responses:
@@ -105,7 +108,9 @@ def _response(problem: EstimationProblem, force_model: ForceModel, candidate: Ca
         np.array([getattr(one, name) for one in candidate.parameters]) for name in ("size", "low", "high", "neutral")
     )
     at = neutral.copy()
-    idle = candidate.effect.unreported(problem.plain.measurements, np.clip(neutral + size, low, high))
+    # What can only be smaller than neutral, such as a share that is left, is smaller.
+    usual = np.clip(np.where(high > neutral, neutral + size, neutral - size), low, high)
+    idle = candidate.effect.unreported(problem.plain.measurements, usual)
     own = [k for k, one in enumerate(candidate.parameters) if one.name not in idle and size[k] > HELD]
     for k, start in enumerate(candidate.start):
         if k not in own:
@@ -131,9 +136,9 @@ def _response(problem: EstimationProblem, force_model: ForceModel, candidate: Ca
     still = [k for k, norm in zip(own, norms, strict=True) if norm <= sqrt(ROUNDING) * max(float(norms.max()), 1.0)]
     acting = [k for k in own if k not in still]
     if still and acting:
-        usual = at.copy()
-        usual[acting] = np.clip(neutral + size, low, high)[acting]
-        move(usual, still)
+        there = at.copy()
+        there[acting] = usual[acting]
+        move(there, still)
     does = [k for k in own if np.linalg.norm(found[:, k]) > sqrt(ROUNDING)]
     return [candidate.parameters[k].name for k in does], found[:, does]
 

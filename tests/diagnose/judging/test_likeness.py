@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from math import cos, radians, sqrt
 from pathlib import Path
@@ -13,8 +14,9 @@ import pytest
 
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, fit
 from ferryid.diagnose.judging.likeness import Likeness, likeness, likeness_as_json, separation
-from ferryid.diagnose.judging.responses import Key, Responses, responses, together
+from ferryid.diagnose.judging.responses import Key, Responses, has_response, responses, together
 from ferryid.diagnose.judging.thresholds import JUDGING
+from ferryid.effects import effects
 from ferryid.effects.effect import Effect, Parameter
 from ferryid.effects.force_model import ForceModel, Measurements, hull_of
 from ferryid.types import Floats
@@ -154,15 +156,12 @@ def spring(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMod
     return replace(force_model, external=force_model.external + np.outer(pull, [1.0, 0.0, 0.0]))
 
 
-def test_every_parameter_goes_to_its_usual_size_and_an_idle_one_where_the_others_have_theirs() -> None:
-    parameters = (
-        Parameter("stiffness", "N/m", 2.0, 0.0, 100.0, start=0.5),
-        Parameter("place", "m", 10.0, -1e3, 1e3),
-        Parameter("square", "N", 3.0, -1e3, 1e3),
-        Parameter("nothing", "N", 1.0, -1e3, 1e3),
-    )
+def of_one(
+    apply: Callable[[ForceModel, Floats, str | None], ForceModel], parameters: tuple[Parameter, ...]
+) -> Responses:
+    """Return the responses of one effect in a log whose prediction errors are the external force on the first axis."""
     candidate = Candidate(
-        Effect("spring", "Spring", lambda profile: (), spring, lambda v, i: "", lambda v, i: {}), None, parameters
+        Effect("effect", "Effect", lambda profile: (), apply, lambda v, i: "", lambda v, i: {}), None, parameters
     )
     zero = np.zeros((ROWS, 3))
     seen = Measurements(
@@ -183,12 +182,47 @@ def test_every_parameter_goes_to_its_usual_size_and_an_idle_one_where_the_others
             whitening_filter=SimpleNamespace(white=lambda gaps: gaps[:, 0]),
         ),
     )
-    found = responses(problem, Fit((), (), np.empty((0, 0)), plain.hull, 0.0), [candidate])
+    return responses(problem, Fit((), (), np.empty((0, 0)), plain.hull, 0.0), [candidate])
+
+
+def share_left(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+    """Keep a share of a growing force where it exceeds a limit."""
+    x = np.arange(ROWS) / ROWS
+    left = x * np.where(x > p[1], p[0], 1.0)
+    return replace(force_model, external=force_model.external + np.outer(left, [1.0, 0.0, 0.0]))
+
+
+def test_every_parameter_goes_to_its_usual_size_and_an_idle_one_where_the_others_have_theirs() -> None:
+    parameters = (
+        Parameter("stiffness", "N/m", 2.0, 0.0, 100.0, start=0.5),
+        Parameter("place", "m", 10.0, -1e3, 1e3),
+        Parameter("square", "N", 3.0, -1e3, 1e3),
+        Parameter("nothing", "N", 1.0, -1e3, 1e3),
+    )
+    found = of_one(spring, parameters)
     x = np.arange(ROWS) / ROWS
     # From nothing to 2 N/m; half of what lies between -10 and 10 m with 2 N/m; half of what lies between -9 and 9 N.
     expected = np.column_stack([-2.0 * x, np.full(ROWS, 20.0), np.full(ROWS, 9.0)])
     assert [name for _, name in found.parameters] == ["stiffness", "place", "square"]
     np.testing.assert_allclose(found.products[H:, H:], expected.T @ expected)
+
+
+def test_where_a_share_is_lost_matters_though_no_share_can_exceed_all() -> None:
+    parameters = (
+        Parameter("share", "-", 0.4, 0.0, 1.0, neutral=1.0),
+        Parameter("limit", "-", 0.2, 0.1, 0.9, neutral=0.5),
+    )
+    found = of_one(share_left, parameters)
+    x = np.arange(ROWS) / ROWS
+    # From 0.6 to all of it; half of what lies between limits of 0.3 and 0.7 with 0.6 left.
+    expected = np.column_stack([0.4 * x * (x > 0.5), 0.2 * x * ((x > 0.3) & (x <= 0.7))])
+    assert [name for _, name in found.parameters] == ["share", "limit"]
+    np.testing.assert_allclose(found.products[H:, H:], expected.T @ expected)
+
+
+def test_what_only_passes_or_comes_by_chance_has_no_response_before_it_is_found() -> None:
+    without = {one.id for one in effects().values() if not has_response(Candidate(one, None, ()))}
+    assert without == {"external_push", "gusts", "waves", "hull_parameters"}
 
 
 SCENARIO = 'schema = "ferryid.scenario/1"\nvessel = "milliampere"\n[path]\nkind = "points"\npoints = {}\ndwell_s = 40\n'
@@ -211,5 +245,5 @@ def test_rivals_look_alike_on_one_heading_and_apart_on_many(tmp_path: Path) -> N
     # What acts on different axes never looks alike.
     assert alike(found["many"], WIND, gain) < 0.2
     every = {one.effect for one in found["many"].effects}
-    assert {"gusts", "waves", "hull_parameters"}.isdisjoint(every)
-    assert len(every) == 14
+    assert {"gusts", "waves", "external_push", "hull_parameters"}.isdisjoint(every)
+    assert len(every) == 15
