@@ -22,6 +22,11 @@ BROKEN = (
     stored("azimuth_offset", "thruster1", angle=12.0),
     stored("thruster_lag", time_constant=0.8),
     stored("thrust_inflow_loss", per_mps=0.15),
+    stored("dead_band", "thruster1", ahead=120.0),
+    stored("astern_asymmetry", "thruster2", factor=0.7),
+    stored("thrust_saturation", "thruster1", ahead=220.0),
+    # A parameter that is a keyword in Python.
+    stored("ventilation", "thruster2", **{"factor": 0.5, "from": 55.0}),
     stored("heading_bias", angle=2.0),
 )
 

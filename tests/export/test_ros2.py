@@ -84,12 +84,18 @@ def test_effects_have_numbers_and_sentences() -> None:
     assert effects["thruster_gain_thruster2"]["factor"] == 0.6
     assert effects["thruster_gain_thruster2"]["acts_on"] == "thrusters"
     assert "60 %" in effects["thruster_gain_thruster2"]["says"]
+    assert (effects["ventilation_thruster2"]["factor"], effects["ventilation_thruster2"]["from"]) == (0.5, 55.0)
+    assert effects["dead_band_thruster1"]["ahead"] == 120.0
     assert {key: one["acts_on"] for key, one in effects.items()} == {
         "fouling": "hull",
         "thruster_gain_thruster2": "thrusters",
         "azimuth_offset_thruster1": "thrusters",
         "thruster_lag": "thrusters",
         "thrust_inflow_loss": "thrusters",
+        "dead_band_thruster1": "thrusters",
+        "astern_asymmetry_thruster2": "thrusters",
+        "thrust_saturation_thruster1": "thrusters",
+        "ventilation_thruster2": "thrusters",
         "heading_bias": "sensors",
     }
     assert "effects" not in parameters("no basis")
