@@ -222,7 +222,7 @@ def test_a_late_force_comes_as_late_as_it_should() -> None:
     """The centre of the answer to a step is the sum of both stages."""
     one = replace(FERRY, thrusters=FERRY.thrusters[:1])
     gear = world_of(one, lag_s=0.8).thrusters
-    state, forces = np.array([[800.0, 0.0, 800.0, 0.0, 0.0]]), []
+    state, forces = np.array([[800.0, 0.0, 800.0, 0.0, 0.0, 0.0]]), []
     change, parts = np.zeros((1, STATES)), np.zeros((1, 3))
     for _ in range(2000):
         thrust(gear, 0.0, state, np.zeros(6), np.array([[800.0, 0.0]]), change, np.zeros(6), parts)

@@ -78,12 +78,12 @@ class PlantEffect:
     excludes
         Effects that it is not combined with, as no log distinguishes them.
     neutral
-        Value at which a parameter changes nothing.
+        Value at which a parameter changes nothing; 0 for a limit, whose error is a share of the limit.
     vessel
         That its detection curve is of: the ferry, but for what the ferry's thrusters, which turn round, never do; that is not
         combined with others.
     positions
-        Parameters that are places on the chart, whose distance from neutral means nothing.
+        Parameters that say where the effect acts, such as places on the chart: their distance from neutral means nothing.
     """
 
     id: str
