@@ -160,15 +160,6 @@ def span_s(problem: EstimationProblem, candidate: Candidate) -> float:
     return min(candidate.offset_s, float(times[-1])) - max(candidate.onset_s, float(times[0]))
 
 
-def in_the_middle(problem: EstimationProblem, candidate: Candidate) -> Candidate:
-    """Return a candidate that passes as it would in the middle of a log, half as long as it may; any other as it is."""
-    if not candidate.effect.passing:
-        return candidate
-    times = problem.steps.middle_s
-    middle, half = 0.5 * float(times[0] + times[-1]), 0.25 * longest_s(problem, candidate)
-    return replace(candidate, onset_s=middle - half, offset_s=middle + half)
-
-
 def part_s(problem: EstimationProblem, candidate: Candidate) -> float:
     """Return how long a part of the log is [s]."""
     return float(np.median(np.diff(_edges(problem, candidate))))

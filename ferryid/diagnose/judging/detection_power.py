@@ -20,7 +20,6 @@ from ferryid.diagnose.inference.estimation import (
     effect_slopes,
     fitted_force_model,
 )
-from ferryid.diagnose.inference.onset_estimation import in_the_middle
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.experiment_design import OTHERWISE, SHOWS
 from ferryid.diagnose.judging.thresholds import JUDGING
@@ -79,10 +78,10 @@ def detection_powers(problem: EstimationProblem, kept: Fit, library: Sequence[Ca
     taken = {one.key for one in kept.candidates}
     made = []
     for candidate in library:
-        if candidate.key in taken or candidate.effect.id == HULL:
+        # How visible what passes is depends on when it does, which is not known of one that was not found.
+        if candidate.key in taken or candidate.effect.id == HULL or candidate.effect.passing:
             continue
         size = np.array([one.size for one in candidate.parameters])
-        candidate = in_the_middle(problem, candidate)
         chance = 1.0
         for usual in _usual(candidate):
             there = problem.white(candidate.act(force_model, usual))

@@ -110,6 +110,19 @@ def test_what_was_found_and_what_is_only_noise_have_no_chance_to_tell() -> None:
     assert detection_powers(linear(0.2), NOTHING, [still]) == ()
     found = Fit((PUSH,), (np.array([5.0]),), np.eye(1), hull_of(FERRY), 0.0)
     assert detection_powers(linear(0.2), found, [PUSH]) == ()
+    brief = replace(PUSH, effect=replace(PUSH.effect, onset=True, longest_s=60.0))
+    assert detection_powers(linear(0.2), NOTHING, [brief]) == (), "nobody knows when"
+
+
+def test_a_share_that_is_left_is_smaller_at_its_usual_size() -> None:
+    def lost(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+        return push(force_model, 100.0 * (1.0 - p), instance)
+
+    share = (Parameter("share", "-", 0.1, 0.0, 1.0, neutral=1.0),)
+    (one,) = detection_powers(
+        linear(0.06), NOTHING, [replace(PUSH, effect=replace(PUSH.effect, apply=lost), parameters=share)]
+    )
+    assert one.chance == pytest.approx(chance(linear(0.06)))
 
 
 @pytest.mark.parametrize("axis", list(AXES))
