@@ -179,10 +179,15 @@ def lasts_s(problem: EstimationProblem, candidate: Candidate) -> float:
 
 
 def _edges(problem: EstimationProblem, candidate: Candidate) -> Floats:
-    """Return where the log is cut [s], into parts of as many steps each: in a gap nothing begins or ends."""
+    """Return where the log is cut [s], into parts of as many steps each: in a gap nothing begins or ends.
+
+    A part is as long as the shortest span of the candidate.
+    """
     times = problem.steps.middle_s
     most = MOST_VALUES / (len(times) * problem.steps.channels.sum() * len(candidate.parameters))
-    parts = max(INFERENCE.span_parts, int(min(len(times) * stride_s(problem.steps) / INFERENCE.span_s, most)))
+    parts = max(
+        INFERENCE.span_parts, int(min(len(times) * stride_s(problem.steps) / shortest_s(problem, candidate), most))
+    )
     return np.interp(np.linspace(0.0, len(times) - 1.0, parts + 1), np.arange(len(times)), times)
 
 
