@@ -105,16 +105,18 @@ def detection_powers(problem: EstimationProblem, kept: Fit, library: Sequence[Ca
 
 
 def _usual(candidate: Candidate) -> list[Floats]:
-    """Return parameters of usual size: all larger than neutral, and every other one smaller where that is possible.
+    """Return parameters of usual size: all larger than neutral, and every other one of those that may be smaller, smaller.
 
-    What can only be smaller than neutral, such as a share that is left, is smaller in both.
+    What can only be smaller than neutral, such as a share that is left, is smaller in both; what can only be larger, larger.
     """
     neutral = np.array([one.neutral for one in candidate.parameters])
     size = np.array([one.size for one in candidate.parameters])
     low, high = (np.array([getattr(one, end) for one in candidate.parameters]) for end in ("low", "high"))
     larger = np.where(high > neutral, 1.0, -1.0)
-    signs = [larger, np.where(np.arange(len(size)) % 2 == 0, -1.0, larger)]
-    return [np.clip(neutral + sign * size, low, high) for sign in signs]
+    either = np.flatnonzero((low < neutral) & (high > neutral))
+    other = larger.copy()
+    other[either[::2]] = -1.0
+    return [np.clip(neutral + sign * size, low, high) for sign in ([larger, other] if either.size else [larger])]
 
 
 def unexcited_axes(problem: EstimationProblem) -> tuple[str, ...]:

@@ -125,6 +125,15 @@ def test_a_share_that_is_left_is_smaller_at_its_usual_size() -> None:
     assert one.chance == pytest.approx(chance(linear(0.06)))
 
 
+@pytest.mark.parametrize(("low", "high"), [(0.0, 1e4), (-1e4, 0.0), (-1e4, 1e4)])
+def test_what_goes_one_way_only_has_the_chance_of_what_may_go_either_way(low: float, high: float) -> None:
+    (parameter,) = PUSH.parameters
+    (one,) = detection_powers(
+        linear(0.06), NOTHING, [replace(PUSH, parameters=(replace(parameter, low=low, high=high),))]
+    )
+    assert one.chance == chance(linear(0.06))
+
+
 @pytest.mark.parametrize("axis", list(AXES))
 def test_an_axis_that_moves_is_told_from_those_that_do_not(axis: str) -> None:
     hull = np.zeros((ROWS, len(COEFFICIENTS)))
