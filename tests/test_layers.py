@@ -96,7 +96,7 @@ def test_imports_point_one_way(path: Path) -> None:
 
 BORDERS = ("regression", "models", "identify", "compare")
 """Packages of which others import only what the `__all__` of the package, or of a package in it, names."""
-MOST_PUBLIC_NAMES = 22
+MOST_PUBLIC_NAMES = 23
 
 
 def _packages() -> list[Path]:

@@ -33,7 +33,8 @@ class Parameter:
 
     `size` is what a parameter of moderate size is, in `unit`: the standard deviation of what is believed of it before a log is
     seen. `low` and `high` are the ends of what is possible. `neutral` changes nothing. `start` is where a search begins, if not
-    there: where another parameter has no meaning at the neutral value of this one.
+    there: where another parameter has no meaning at the neutral value of this one. `attainable` are ends that can be true as
+    they are, such as no force at all of a thruster.
     """
 
     name: str
@@ -43,6 +44,16 @@ class Parameter:
     high: float
     neutral: float = 0.0
     start: float | None = None
+    attainable: frozenset[float] = frozenset()
+
+    def at_bound(self, value: float) -> bool:
+        """Return whether a value stands at an end of what is possible, at which the search for it stopped.
+
+        An end at which nothing acts is none, nor one that a vessel can really be at.
+        """
+        near = EFFECTS.at_bound * (self.high - self.low)
+        ends = [end for end in (self.low, self.high) if end != self.neutral and end not in self.attainable]
+        return any(abs(value - end) <= near for end in ends)
 
 
 @dataclass(frozen=True)
@@ -179,8 +190,8 @@ class Effect:
         ``unsteady(force_model)(p)`` returns stochastic disturbances from positive parameters; none where the force model has
         nothing for them to act on. Such an effect changes no force model: it is a state of the filter.
     doubt
-        ``doubt(values)`` returns why values by name may stand in for something else whatever the data say, as the end of a
-        sentence; empty where they are as they may be.
+        ``doubt(values, profile)`` returns why values by name are not credible of a vessel, or may stand in for something else,
+        whatever the data say, as the end of a sentence; empty where they are as they may be.
     of_log
         Of a condition that steadily acts on a whole log: names of the parameters that each log of a vessel has its own of; the
         others are the vessel's. Empty for what is no such condition.
@@ -222,7 +233,7 @@ class Effect:
     profiled: str = ""
     of_sensor: bool = False
     unsteady: Callable[[ForceModel], Processes] | None = None
-    doubt: Callable[[Values], str] = lambda values: ""
+    doubt: Callable[[Values, Profile], str] = lambda values, profile: ""
     of_log: tuple[str, ...] = ()
     turbulence: Turbulence | None = None
     absent_in: tuple[str, ...] = ()

@@ -14,6 +14,7 @@ from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import ForceModel, corrected
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
+from ferryid.vessel.dimensions import off_hull
 from ferryid.vessel.frames import to_world
 from ferryid.vessel.profile import Profile
 
@@ -46,6 +47,11 @@ def says(values: Values, instance: str | None) -> str:
     return f"Position and velocity belong to a point {abs(x):.2f} m {ends[0]} and {abs(y):.2f} m {ends[1]} of the body origin."
 
 
+def doubt(values: Values, profile: Profile) -> str:
+    """Return that the antenna would not be aboard."""
+    return off_hull(profile, values.get("x", 0.0), values.get("y", 0.0))
+
+
 def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     """Return the scenario's antenna."""
     return {"sensors": {"navigation": {"antenna_m": [values["x"], values["y"]]}}}
@@ -68,4 +74,5 @@ EFFECT = Effect(
     regressor=regressor,
     changes_hull=True,
     formula_error=EFFECTS.definition_error,
+    doubt=doubt,
 )

@@ -12,7 +12,9 @@ import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values, span
 from ferryid.effects.force_model import ForceModel, Measurements, aboard, added_mass
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
+from ferryid.vessel.dimensions import off_hull
 from ferryid.vessel.profile import Profile
 
 WATERPLANE = 0.85
@@ -75,6 +77,17 @@ def says(values: Values, instance: str | None) -> str:
     return f"The vessel carried {abs(values['mass']):.0f} kg {word} than the hull model allows for, {place}."
 
 
+def doubt(values: Values, profile: Profile) -> str:
+    """Return that the vessel could not carry it, or not there."""
+    mass, x = (values.get(name, 0.0) for name in ("mass", "x"))
+    share = mass / profile.hull.mass_kg
+    if share > EFFECTS.heaviest_load:
+        return f"the load would be {100.0 * share:.0f} % of the vessel's own mass, more than one carries"
+    if mass < 0.0:
+        return f"the vessel would be {-mass:.0f} kg lighter than it is empty"
+    return off_hull(profile, x, 0.0)
+
+
 def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     """Return the scenario's payload."""
     return {"payload": [{"mass_kg": values["mass"], "x_m": values["x"], **span(values)}]}
@@ -103,4 +116,5 @@ EFFECT = Effect(
     regressor=regressor,
     changes_hull=True,
     profiled="mass",
+    doubt=doubt,
 )

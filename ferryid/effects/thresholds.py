@@ -138,6 +138,18 @@ class EffectThresholds:
         "lowest frequency of waves",
         "convention: deep-water waves of a quarter of the frequency are sixteen times as long, and slower is no sea",
     )
+    at_bound: float = threshold(
+        0.01,
+        "of the range of a parameter",
+        "nearer to an end of it than this, a search was stopped by the bound",
+        "convention: a hundredth",
+    )
+    heaviest_load: float = threshold(
+        0.6,
+        "of the vessel's own mass",
+        "heaviest load that a finding can be sure of",
+        "convention: a small passenger ferry full to the last place carries about half of its own mass",
+    )
     least_place: float = threshold(
         0.05, "of the log", "least share of a log that lies in a place of shallow water", "convention: a twentieth"
     )

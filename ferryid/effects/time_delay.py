@@ -41,9 +41,9 @@ def says(values: Values, instance: str | None) -> str:
     )
 
 
-def doubt(values: Values) -> str:
+def doubt(values: Values, profile: Profile) -> str:
     """Return that nothing moves before it is pushed."""
-    if values["seconds"] >= 0.0:
+    if values.get("seconds", 0.0) >= 0.0:
         return ""
     return "the motion precedes its force, which a force missing from the model causes as easily as a clock"
 

@@ -5,6 +5,7 @@ from ferryid.identify.archive import fit_archive
 from ferryid.identify.block_sum_store import load_block_sums
 from ferryid.identify.model_selection import Selection
 from ferryid.identify.outcome import ComponentCurve, Excitation, FitOutcome, LogFit
+from ferryid.identify.physical_checks import inertia_checks
 from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.remainder import fit_remainder, prediction_errors, with_remainder
 from ferryid.identify.settings import FOLDS, TEST_WINDOW_S, FitSettings, check_window, parse_window, parse_windows
@@ -27,6 +28,7 @@ __all__ = [
     "fit_logs",
     "fit_remainder",
     "force_mse",
+    "inertia_checks",
     "load_block_sums",
     "load_windows",
     "parse_window",

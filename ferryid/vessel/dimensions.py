@@ -26,6 +26,28 @@ def dimensions(profile: Profile) -> tuple[float, float, float]:
     return length, beam, draught
 
 
+def off_hull(profile: Profile, x: float, y: float) -> str:
+    """Return that a point is not on the hull, as the end of a sentence; empty where it is.
+
+    The body origin is taken to be amidships or at the centre of gravity, whichever leaves more room.
+
+    Parameters
+    ----------
+    profile
+        The vessel.
+    x, y
+        How far the point is ahead and to starboard of the body origin [m].
+    """
+    length, beam, _ = dimensions(profile)
+    middle = profile.hull.x_g_m
+    ends = (min(middle, 0.0) - 0.5 * length, max(middle, 0.0) + 0.5 * length)
+    if not ends[0] <= x <= ends[1]:
+        return f"{abs(x):.2f} m {'ahead' if x > 0.0 else 'astern'} of the body origin is off a hull of {length:.3g} m"
+    if abs(y) > 0.5 * beam:
+        return f"{abs(y):.2f} m to {'starboard' if y > 0.0 else 'port'} is off a hull that is {beam:.3g} m wide"
+    return ""
+
+
 def froude_seconds(profile: Profile, seconds: float) -> float:
     """Return a time [s] that is `seconds` for a vessel of 5 m: longer ones are slower, by Froude's law."""
     return seconds * sqrt(dimensions(profile)[0] / _WINDOW_LENGTH_M)

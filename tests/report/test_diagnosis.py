@@ -20,8 +20,8 @@ import pytest
 from ferryid import __version__
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.spectra import Band
+from ferryid.diagnose.judging.credibility import HullChange as Moved
 from ferryid.diagnose.judging.diagnosis import Diagnosis, Withheld
-from ferryid.diagnose.judging.diagnosis import HullChange as Moved
 from ferryid.diagnose.judging.error_profiles import profile_of
 from ferryid.diagnose.judging.finding import Finding, LawTerm, Rival
 from ferryid.diagnose.judging.locate import Location

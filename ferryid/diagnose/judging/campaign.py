@@ -15,6 +15,7 @@ from ferryid.diagnose.judging.campaign_errors import LogErrors
 from ferryid.diagnose.judging.campaign_evidence import HeldOutLoss, held_out_loss, without_conditions
 from ferryid.diagnose.judging.campaign_properties import PropertyTest, judge_properties, tested
 from ferryid.diagnose.judging.claims import Claim, Figures
+from ferryid.diagnose.judging.credibility import campaign_hull
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.posterior import HullPosterior
 from ferryid.effects.force_model import COEFFICIENTS, ForceModel
@@ -46,10 +47,18 @@ class JudgedCampaign:
         return self.conditions.hull
 
     @cached_property
+    def hull_doubt(self) -> str:
+        """Why the common hull cannot be the vessel's, as the end of a sentence; empty where it can."""
+        return campaign_hull(self.hull.fit).doubt
+
+    @cached_property
     def hull_posterior(self) -> HullPosterior | None:
-        """What all logs say of a hull that was known before; None of a guessed one, which has drag that no model file has."""
+        """What all logs say of a hull that was known before.
+
+        None of a guessed one, which has drag that no model file has, and of one that cannot be the vessel's.
+        """
         prior, h = self.hull.fit.campaign.hull, len(COEFFICIENTS)
-        if not prior.known:
+        if not prior.known or self.hull_doubt:
             return None
         mean, covariance = self.hull.fit.belief()
         return HullPosterior(prior.mean[:h], prior.spread[:h], mean[:h], covariance[:h, :h])

@@ -36,6 +36,7 @@ from ferryid.diagnose.judging.campaign_evidence import (
     without_conditions,
 )
 from ferryid.diagnose.judging.claims import Claim, Figures
+from ferryid.diagnose.judging.credibility import felt, unfelt, value_doubt
 from ferryid.diagnose.judging.experiment_design import manoeuvre
 from ferryid.diagnose.judging.figure_data import axis_of_errors, error_columns
 from ferryid.diagnose.judging.finding import Finding, Rival
@@ -147,7 +148,27 @@ class ConditionTest:
             return f"a {listed(self.outdone, 'or')}, which cannot be true, explains more"
         if self.unresolved:
             return f"a {listed([effects()[one].title.lower() for one in self.unresolved])} explains about as much"
-        return ""
+        improvement = _improvement(self)
+        worst = int(np.argmin(improvement))
+        if improvement[worst] < -JUDGING.worsening:
+            share = -100.0 * float(improvement[worst])
+            return f"it makes the held-out squared force error of the logs in {AXES[worst]} {share:.0f} % larger"
+        return unfelt(self.felt.max(axis=0))
+
+    @cached_property
+    def felt(self) -> Floats:
+        """How much of the measured acceleration of each log it is, by axis, shape (logs, 3)."""
+        campaign = self.fit.campaign
+        common, own = self.fit.common.copy(), self.fit.own.copy()
+        common[campaign.means], own[:, : len(campaign.own)] = 0.0, 0.0
+        return felt(self.fit, common, own)
+
+    def value_doubt(self, i: int) -> str:
+        """Return why what a log has of it is not credible, or not felt, as the end of a sentence; empty where it is."""
+        parameters = [one for _, one in self.fit.campaign.own]
+        values = dict(zip((one.name for one in parameters), self.condition(i)[0].tolist(), strict=True))
+        profile = self.fit.campaign.members[i].plain.measurements.profile
+        return value_doubt(effects()[self.effect], parameters, values, profile) or unfelt(self.felt[i])
 
     @property
     def probability(self) -> float:
@@ -178,8 +199,10 @@ class JudgedConditions:
         if i is None:
             return ()
         shown = [one for one in self.tests if one.confirmed] or [one for one in self.tests[:1] if one.estimated]
-        found = [_finding(one, i, self.tests) for one in shown]
-        return tuple(Claim(one, Figures("condition")) for one in found if one is not None)
+        found = [(one, _finding(one, i, self.tests)) for one in shown]
+        return tuple(
+            Claim(said, Figures("condition", doubt=one.value_doubt(i))) for one, said in found if said is not None
+        )
 
 
 def judge_conditions(campaign: Campaign, place: Mapping[str, int], progress: Callable[[str], None]) -> JudgedConditions:
@@ -308,6 +331,16 @@ def _figure(test: ConditionTest, i: int, errors: LogErrors, shares: Floats, valu
     regressor = condition.effect.regressor
     known = None if regressor is None else regressor(test.none.force_model(i), value, None, AXES[axis])
     return error_columns(errors.windows, (errors.before, errors.after), axis, known)
+
+
+def _improvement(test: ConditionTest) -> Floats:
+    """Return the share of the held-out squared force error of all logs that a condition removes, by axis, shape (3,)."""
+    every = [LogErrors.of(test.fit, test.loss, i) for i in range(len(test.fit.campaign.members))]
+    before, after = (
+        np.sum([np.sum(one**2, axis=0) for one in errors], axis=0)
+        for errors in ([one.before for one in every], [one.after for one in every])
+    )
+    return np.asarray(1.0 - after / np.where(before > 0.0, before, np.inf))
 
 
 def note(test: ConditionTest, logs: int) -> str:

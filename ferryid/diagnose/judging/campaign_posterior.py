@@ -71,6 +71,7 @@ def campaign_posterior(
         tuple(vessel),
         tuple(conditions),
         together.hull_posterior,
+        together.hull_doubt,
         () if own is None else own.notes,
     )
 

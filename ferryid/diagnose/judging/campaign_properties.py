@@ -11,15 +11,16 @@ import numpy as np
 from ferryid.counts import counted
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit
+from ferryid.diagnose.inference.campaign_model import Campaign
 from ferryid.diagnose.inference.campaign_properties import ScoredProperty, select_properties, without_property
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.force_errors import mass_of
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.campaign_evidence import Gain, held_out_loss
+from ferryid.diagnose.judging.credibility import felt, unfelt, value_doubt
 from ferryid.diagnose.judging.finding import Finding, Rival
 from ferryid.diagnose.judging.thresholds import JUDGING
-from ferryid.effects.effect import Parameter
 from ferryid.types import AXES, Floats
 
 
@@ -43,8 +44,8 @@ class PropertyTest:
         Share of the held-out squared force error of all logs that it removes, shape (3,).
     rivals
         What was tried in its place, with the evidence over it [nat], below zero.
-    at_bound
-        True where a parameter stands at an end of what is possible.
+    credibility
+        Why it cannot be true of the vessel, or would not be felt, as the end of a sentence; empty where neither is so.
     """
 
     candidate: Candidate
@@ -54,7 +55,7 @@ class PropertyTest:
     holding: tuple[int, int]
     improvement: Floats
     rivals: tuple[Rival, ...]
-    at_bound: bool
+    credibility: str = ""
 
     @property
     def doubt(self) -> str:
@@ -67,10 +68,8 @@ class PropertyTest:
             return "held-out stretches of the logs are not surely predicted better with it"
         if held < JUDGING.campaign_share * logs:
             return f"only {held} of {counted(logs, 'log')} are predicted better with it on held-out stretches"
-        if self.at_bound:
-            return "its value stands at the bound of its search"
-        if doubt := self.candidate.effect.doubt({name: one.value for name, one in self.estimates.items()}):
-            return doubt
+        if self.credibility:
+            return self.credibility
         if self.improvement[worst] < -JUDGING.worsening:
             share = -100.0 * float(self.improvement[worst])
             return f"it makes the held-out squared force error in {AXES[worst]} {share:.0f} % larger"
@@ -158,17 +157,24 @@ def tested(made: CampaignFit, candidate: Candidate, rivals: Sequence[ScoredPrope
         (sum(one > 0.0 for one in by_log), len(by_log)),
         np.asarray(1.0 - squares[1] / np.where(squares[0] > 0.0, squares[0], np.inf)),
         tuple({(one.effect, one.instance): one for one in reversed(others)}.values()),
-        any(_at_bound(one, at) for one, at, _ in reported),
+        _credibility(made, candidate, {one.name: at for one, at, _ in reported}),
     )
+
+
+def _credibility(made: CampaignFit, candidate: Candidate, values: Mapping[str, float]) -> str:
+    """Return why a property cannot be true of the vessel, or would be felt in no log, as the end of a sentence."""
+    profile = made.campaign.members[0].plain.measurements.profile
+    if doubt := value_doubt(candidate.effect, candidate.parameters, values, profile):
+        return doubt
+    without = made.common.copy()
+    without[property_rows(made.campaign, candidate)] = 0.0
+    return unfelt(felt(made, without, made.own).max(axis=0))
 
 
 def _estimate(made: CampaignFit, candidate: Candidate) -> tuple[Floats, Floats]:
     """Return the parameters of a property and their reported standard deviations, as of `Fit.reported_errors`."""
     campaign = made.campaign
-    place = campaign.properties.index(candidate)
-    first = len(campaign.hull.mean) + len(campaign.shared)
-    first += sum(len(one.parameters) for one in campaign.properties[:place])
-    rows = slice(first, first + len(candidate.parameters))
+    place, rows = campaign.properties.index(candidate), property_rows(campaign, candidate)
     size = np.array([one.size for one in candidate.parameters])
     error = size * np.sqrt(np.diag(made.normal.common_covariance)[rows] * max(1.0, made.disagreement))
     value = campaign.values(made.common, made.own[0])[1][place]
@@ -179,6 +185,9 @@ def _estimate(made: CampaignFit, candidate: Candidate) -> tuple[Floats, Floats]:
     return value, np.asarray(np.hypot(INFERENCE.posterior_factor * error, beyond))
 
 
-def _at_bound(parameter: Parameter, value: float) -> bool:
-    near = JUDGING.at_bound * (parameter.high - parameter.low)
-    return value <= parameter.low + near or value >= parameter.high - near
+def property_rows(campaign: Campaign, candidate: Candidate) -> slice:
+    """Return where the parameters of a property stand in the vector of all logs."""
+    place = campaign.properties.index(candidate)
+    first = len(campaign.hull.mean) + len(campaign.shared)
+    first += sum(len(one.parameters) for one in campaign.properties[:place])
+    return slice(first, first + len(candidate.parameters))

@@ -51,6 +51,8 @@ class Figures:
         Share of a disturbance's power that the velocities show, about its peak.
     other_logs
         What the other logs of a campaign say of a law; None where there are none.
+    doubt
+        Why its values are not credible, as the end of a sentence; empty where they are.
     """
 
     kind: Kind
@@ -64,6 +66,7 @@ class Figures:
     passes: float = inf
     power_in_velocities: float = inf
     other_logs: OtherLogs | None = None
+    doubt: str = ""
 
 
 @dataclass(frozen=True)
@@ -92,6 +95,9 @@ class LogFigures:
         Lasting properties of the vessel that each log of the campaign shows, this log's among them.
     baseline_sensors
         Sensor errors that the simulation has which the log is compared with: parameters by effect.
+    hull_doubt, common_hull_doubt
+        Why the hull that was refitted to the log, and the one that was fitted to all logs of a campaign, cannot be the
+        vessel's, as the end of a sentence; empty where they can.
     """
 
     hull_known: bool = True
@@ -100,3 +106,5 @@ class LogFigures:
     unsteady: bool = False
     campaign: tuple[frozenset[Key], ...] = ()
     baseline_sensors: Mapping[str, Mapping[str, Estimate]] = field(default_factory=dict)
+    hull_doubt: str = ""
+    common_hull_doubt: str = ""

@@ -21,6 +21,7 @@ from ferryid.diagnose.judging.campaign import JudgedCampaign
 from ferryid.diagnose.judging.campaign_posterior import campaign_posterior
 from ferryid.diagnose.judging.claims import Claim, Key, LogFigures
 from ferryid.diagnose.judging.confidence_rules import apply_rules, lasting, log_notes
+from ferryid.diagnose.judging.credibility import refitted_hull
 from ferryid.diagnose.judging.detection_power import (
     detection_powers,
     is_testable,
@@ -28,7 +29,7 @@ from ferryid.diagnose.judging.detection_power import (
     unexcited_axes,
     untested_notes,
 )
-from ferryid.diagnose.judging.diagnosis import Diagnosis, HullChange
+from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.diagnose.judging.free_runs import FreeRuns
 from ferryid.diagnose.judging.held_out import HeldOutEvidence, Improvement
 from ferryid.diagnose.judging.hidden_signal import compare_hidden_signals
@@ -37,7 +38,6 @@ from ferryid.diagnose.judging.likeness import likeness_of_logs
 from ferryid.diagnose.judging.locate import locate, locate_between
 from ferryid.diagnose.judging.posterior import posterior_of
 from ferryid.diagnose.judging.verdict import Remainder, verdict_of
-from ferryid.effects.force_model import COEFFICIENTS, UNITS
 from ferryid.types import AXES, Floats
 
 
@@ -67,21 +67,20 @@ def conclude(
     claims = {
         one.path: (
             *(() if together is None else together.claims(one.path)),
-            *(by_path[one.path].claims if one.path in by_path else sensor_claims(one.screened.sensors)),
+            *(by_path[one.path].claims if one.path in by_path else sensor_claims(one.screened)),
         )
         for one in logs
     }
     noted = (*left_out, *(() if together is None else together.notes))
     same = dict(repeated(logs))
     campaign = tuple(_lasting(claims[one.path]) for one in logs) if baseline.joint else ()
+    shared = LogFigures(campaign=campaign, common_hull_doubt="" if together is None else together.hull_doubt)
     single, of_all = likeness_of_logs(judged, together, same)
     found = tuple(
         _with_origin(
-            _concluded(by_path[one.path], claims[one.path], campaign, (*_copied(same.get(one.path)), *noted), together)
+            _concluded(by_path[one.path], claims[one.path], shared, (*_copied(same.get(one.path)), *noted), together)
             if one.path in by_path
-            else _too_short(
-                one, claims[one.path], baseline, campaign, (*_copied(same.get(one.path)), *noted), together
-            ),
+            else _too_short(one, claims[one.path], baseline, shared, (*_copied(same.get(one.path)), *noted), together),
             one,
             together,
             same.get(one.path),
@@ -127,12 +126,12 @@ def _too_short(
     log: AveragedLog,
     claims: Sequence[Claim],
     baseline: Baseline,
-    campaign: tuple[frozenset[Key], ...],
+    shared: LogFigures,
     noted: tuple[str, ...],
     together: JudgedCampaign | None,
 ) -> Diagnosis:
     screened = log.screened
-    figures = LogFigures(joint=baseline.joint, campaign=campaign, baseline_sensors=baseline.sensors)
+    figures = replace(shared, joint=baseline.joint, baseline_sensors=baseline.sensors)
     findings, notes = apply_rules(claims, figures)
     profile, window_s = screened.measurements.profile, _window_s(log.windows.weight, log.windows.measurements.step_s)
     short = (
@@ -160,7 +159,7 @@ def _too_short(
 def _concluded(
     log: JudgedLog,
     claims: Sequence[Claim],
-    campaign: tuple[frozenset[Key], ...],
+    shared: LogFigures,
     noted: tuple[str, ...],
     together: JudgedCampaign | None,
 ) -> Diagnosis:
@@ -168,7 +167,7 @@ def _concluded(
     estimated = selected.estimated
     screened, problem, kept = estimated.averaged.screened, selected.search.problem, stands.fit
     measurements, survey = screened.measurements, screened.measured.survey
-    figures = replace(log.figures, campaign=campaign)
+    figures = replace(log.figures, campaign=shared.campaign, common_hull_doubt=shared.common_hull_doubt)
     findings, rule_notes = apply_rules(claims, figures)
     chances, still = detection_powers(problem, kept, selected.steady), unexcited_axes(problem)
     before, after = _scores(problem, log.base, kept, stands.proof)
@@ -213,10 +212,12 @@ def _concluded(
         located=located,
         withheld=compare_hidden_signals(survey.hidden, measurements, findings),
         against=estimated.expectation.comparison,
-        moved=_moved(problem, kept) if kept.candidates else None,
+        moved=refitted_hull(problem, kept).farthest if kept.candidates else None,
         duration_s=_duration_s(screened),
         left_out=survey.motion.left_out,
-        posterior=posterior_of(problem, kept, selected.search.states, findings, survey) if updates else None,
+        posterior=posterior_of(problem, kept, selected.search.states, findings, survey, known=figures.hull_known)
+        if updates
+        else None,
         remainder=remainder,
     )
 
@@ -270,16 +271,6 @@ def _left_shares(problem: EstimationProblem, mse: Mapping[str, float]) -> dict[s
     thrust = windows.mean(windows.measurements.parts.sum(axis=1))
     moves = np.maximum(np.mean(inertia**2, axis=0), np.mean(thrust**2, axis=0))
     return {axis: mse[axis] / float(size) for axis, size in zip(AXES, moves, strict=True) if size > 0.0}
-
-
-def _moved(problem: EstimationProblem, kept: Fit) -> HullChange | None:
-    """Return the hull's coefficient that the refit moved farthest; None where none could move."""
-    free = problem.hull_spread > 0.0
-    if not free.any():
-        return None
-    away = np.divide(kept.hull - problem.plain.hull, problem.hull_spread, out=np.zeros_like(kept.hull), where=free)
-    k = int(np.argmax(np.abs(away)))
-    return HullChange(COEFFICIENTS[k], UNITS[k], float(problem.plain.hull[k]), float(kept.hull[k]), float(away[k]))
 
 
 def _window_s(weight: Floats, step_s: float) -> float:

@@ -299,6 +299,20 @@ def out_of_step_beside_disturbance(finding: Finding, context: Context, threshold
     return lowered(finding, "gusts", manoeuvre="the same manoeuvres in calm air"), ""
 
 
+@rule()
+def not_credible(finding: Finding, context: Context, _threshold: float) -> Outcome:
+    """Lower what cannot be true of the vessel as it is: off the hull, heavier than it carries, at the bound of its search."""
+    return _because(finding, context.own.doubt) if context.own.doubt else (finding, "")
+
+
+@rule()
+def beside_incredible_hull(finding: Finding, context: Context, _threshold: float) -> Outcome:
+    """Lower what was estimated beside a hull that cannot be the vessel's: each may have made up for the other."""
+    of_all = context.own.kind in ("condition", "property")
+    doubt = context.log.common_hull_doubt if of_all else context.log.hull_doubt
+    return _because(finding, doubt) if doubt and context.own.kind != "sensor" else (finding, "")
+
+
 @rule(JUDGING.campaign_share, "of the logs")
 def absent_in_other_logs(finding: Finding, context: Context, threshold: float) -> Outcome:
     """Lower a lasting property of the vessel that fewer of its logs show; a condition is a log's own, and a fault an event."""
@@ -325,6 +339,8 @@ RULES: tuple[ConfidenceRule, ...] = (
     nothing_estimated,
     law_of_one_log,
     absent_in_velocities,
+    not_credible,
+    beside_incredible_hull,
     improves_no_claimed_axis,
     too_brief,
     place_visited_once,

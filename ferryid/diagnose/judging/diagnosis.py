@@ -10,6 +10,7 @@ from typing import Any
 
 from ferryid.diagnose.data.course import MeasuredCourse
 from ferryid.diagnose.data.estimate import Estimate
+from ferryid.diagnose.judging.credibility import HullChange
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.learning import Learned
 from ferryid.diagnose.judging.likeness import Likeness, likeness_as_json
@@ -21,27 +22,6 @@ from ferryid.signals.track import LeftOut
 from ferryid.types import Floats
 
 SCHEMA = "ferryid.diagnosis/1"
-
-
-@dataclass(frozen=True)
-class HullChange:
-    """The coefficient of the hull that a refit moved farthest.
-
-    Attributes
-    ----------
-    coefficient, unit
-        Of `ferryid.effects.force_model.COEFFICIENTS`.
-    before, value
-        What was believed of it, and what came out.
-    deviations
-        The move in standard deviations of what was believed.
-    """
-
-    coefficient: str
-    unit: str
-    before: float
-    value: float
-    deviations: float
 
 
 @dataclass(frozen=True)

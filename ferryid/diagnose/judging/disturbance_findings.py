@@ -15,6 +15,7 @@ from ferryid.diagnose.inference.stochastic_disturbance import DisturbanceState
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.claims import Claim, Figures
+from ferryid.diagnose.judging.credibility import value_doubt
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.effect import Process
@@ -105,7 +106,8 @@ def _claim(
         **shown,
     )
     power_in_velocities = _power_in_velocities(shown["evidence"]) if shown else inf
-    return Claim(finding, Figures("disturbance", power_in_velocities=power_in_velocities))
+    doubt = value_doubt(candidate.effect, candidate.parameters, values, measurements.profile)
+    return Claim(finding, Figures("disturbance", power_in_velocities=power_in_velocities, doubt=doubt))
 
 
 def _power_in_velocities(evidence: Mapping[str, Floats]) -> float:

@@ -24,6 +24,7 @@ from ferryid.diagnose.inference.profile_likelihood import intervals
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.backward_elimination import Elimination
 from ferryid.diagnose.judging.claims import Claim, Figures
+from ferryid.diagnose.judging.credibility import value_doubt
 from ferryid.diagnose.judging.experiment_design import manoeuvre
 from ferryid.diagnose.judging.figure_data import figure_columns, figure_regressor
 from ferryid.diagnose.judging.finding import Finding, Rival
@@ -135,6 +136,7 @@ def _figures(
         block_s=block_s(problem.windows),
         single_visit=candidate.effect.single_visit(problem.plain.measurements, values),
         passes=passes,
+        doubt=value_doubt(candidate.effect, candidate.parameters, reported, problem.plain.measurements.profile),
         **shown,
     )
 

@@ -30,6 +30,7 @@ from ferryid.diagnose.inference.group_differences import (
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.campaign_conditions import judge_conditions
 from ferryid.diagnose.judging.campaign_evidence import Gain, held_out_loss
+from ferryid.diagnose.judging.credibility import value_doubt
 from ferryid.diagnose.judging.experiment_design import manoeuvre
 from ferryid.diagnose.judging.finding import Rival
 from ferryid.diagnose.judging.group_loads import LoadDifference, load_differences
@@ -38,6 +39,7 @@ from ferryid.diagnose.parallel import over
 from ferryid.effects import effects
 from ferryid.effects.effect import Parameter
 from ferryid.effects.wording import listed
+from ferryid.vessel.profile import Profile
 
 
 @dataclass(frozen=True)
@@ -206,7 +208,8 @@ def _judged(made: CampaignFit, candidate: Candidate, contenders: Sequence[Conten
     groups = np.array([made.campaign.members[i].group for i in after.log])
     by_group = {group: Gain.of(gains[groups == group]) for group in GROUPS}
     found = replace(found, gain=Gain.of(gains), by_group=by_group, rivals=_rivals(candidate, contenders))
-    return replace(found, doubt=_doubt(found, made.campaign.hull.known))
+    profile = made.campaign.members[0].plain.measurements.profile
+    return replace(found, doubt=_doubt(found, made.campaign.hull.known, profile))
 
 
 def _rivals(candidate: Candidate, contenders: Sequence[Contender]) -> tuple[Rival, ...]:
@@ -215,7 +218,7 @@ def _rivals(candidate: Candidate, contenders: Sequence[Contender]) -> tuple[Riva
     return tuple(sorted(kept.values(), key=lambda one: -one.delta_score))
 
 
-def _doubt(one: Difference, hull_known: bool) -> str:
+def _doubt(one: Difference, hull_known: bool, profile: Profile) -> str:
     assert one.gain is not None
     assert one.by_group is not None
     if one.evidence < INFERENCE.prior_odds:
@@ -225,14 +228,8 @@ def _doubt(one: Difference, hull_known: bool) -> str:
     for group, gain in one.by_group.items():
         if gain.high < 0.0:
             return f"held-out stretches of group {group} are predicted worse with it"
-    if any(
-        _at_bound(each, one.estimates[each.name].value)
-        for each in one.candidate.parameters
-        if each.name in one.estimates
-    ):
-        return "its value stands at the bound of its search"
     values = {name: each.value for name, each in one.estimates.items()}
-    if doubt := one.candidate.effect.doubt(values):
+    if doubt := value_doubt(one.candidate.effect, one.candidate.parameters, values, profile):
         return doubt
     if not _excludes(one):
         return "no interval excludes that there is none"
@@ -244,11 +241,6 @@ def _doubt(one: Difference, hull_known: bool) -> str:
 def _excludes(one: Difference) -> bool:
     neutral = {each.name: each.neutral for each in one.candidate.parameters}
     return any(each.low > neutral[name] or each.high < neutral[name] for name, each in one.estimates.items())
-
-
-def _at_bound(parameter: Parameter, value: float) -> bool:
-    near = JUDGING.at_bound * (parameter.high - parameter.low)
-    return value <= parameter.low + near or value >= parameter.high - near
 
 
 def _difference(made: CampaignFit, one: Comparison, near: bool) -> Difference:

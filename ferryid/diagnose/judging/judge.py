@@ -6,17 +6,21 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from ferryid.diagnose.checks import SensorFinding
+from ferryid.diagnose.checks.screening import ScreenedLog
 from ferryid.diagnose.inference.estimation import Fit, fit
 from ferryid.diagnose.inference.stages import SelectedLog
 from ferryid.diagnose.judging.backward_elimination import Elimination, eliminate_backward
 from ferryid.diagnose.judging.campaign_laws import CampaignLaws, find_campaign_laws
 from ferryid.diagnose.judging.claims import Claim, Figures, LogFigures
+from ferryid.diagnose.judging.credibility import refitted_hull, value_doubt
 from ferryid.diagnose.judging.disturbance_findings import disturbance_claims
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.findings import force_claims
 from ferryid.diagnose.judging.signal_to_noise import velocity_noise_shares
 from ferryid.diagnose.judging.unexplained import Unexplained, find_unexplained
+from ferryid.effects import effects
 from ferryid.types import AXES
+from ferryid.vessel.profile import Profile
 
 
 @dataclass(frozen=True)
@@ -68,7 +72,7 @@ def _judged(
     unknown = find_unexplained(problem, stands.fit, measurements, laws)
     progress("locating")
     claims = (
-        *sensor_claims(log.estimated.averaged.screened.sensors),
+        *sensor_claims(log.estimated.averaged.screened),
         *force_claims(problem, stands, measurements),
         *disturbance_claims(problem, stands.fit, states, measurements),
         *unknown.claims,
@@ -80,12 +84,13 @@ def _judged(
         velocity_noise=velocity_noise_shares(problem),
         unsteady=unknown.unsteady or bool(states),
         baseline_sensors=baseline.sensors,
+        hull_doubt=refitted_hull(problem, stands.fit, known=baseline.hull_known).doubt,
     )
     return JudgedLog(log, base, stands, unknown, claims, figures)
 
 
-def sensor_claims(sensors: Sequence[SensorFinding]) -> tuple[Claim, ...]:
-    """Return what the checks found as findings: kinematics alone shows them, so that no force is improved."""
+def sensor_claims(log: ScreenedLog) -> tuple[Claim, ...]:
+    """Return what the checks found in a log as findings: kinematics alone shows them, so that no force is improved."""
     return tuple(
         Claim(
             Finding(
@@ -97,7 +102,15 @@ def sensor_claims(sensors: Sequence[SensorFinding]) -> tuple[Claim, ...]:
                 intervals=(),
                 says=one.says,
             ),
-            Figures("sensor"),
+            Figures("sensor", doubt=_doubt(one, log.measurements.profile)),
         )
-        for one in sensors
+        for one in log.sensors
     )
+
+
+def _doubt(one: SensorFinding, profile: Profile) -> str:
+    """Return why an error of a sensor is not credible; those that are no effects of the library have no limits."""
+    if one.effect not in effects():
+        return ""
+    values, known = {name: estimate.value for name, estimate in one.parameters.items()}, effects()[one.effect]
+    return value_doubt(known, known.parameters_of(profile), values, profile)

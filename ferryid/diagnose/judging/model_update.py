@@ -13,6 +13,7 @@ import numpy as np
 
 from ferryid import __version__
 from ferryid.counts import counted
+from ferryid.diagnose.judging.credibility import impossible_masses
 from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.diagnose.judging.learning import Learner
 from ferryid.diagnose.judging.posterior import HullPosterior, Posterior
@@ -69,6 +70,9 @@ def store_updated_model(
         if made is not None and not (learned.accepted or made.hull or made.terms or profile.hull.has_model):
             # Effects without a hull predict nothing.
             made = None
+    if made is not None and any(one.posterior is not None and one.posterior.doubt for one in diagnoses):
+        # Whatever was learned on top.
+        made = replace(made, accepted=False)
     if made is not None and made.scores is None:
         # Neither the diagnoses nor a fit could judge it.
         made = None
@@ -117,7 +121,12 @@ def update_model(
         vessel_effects=_composed(start.vessel_effects, vessel, profile),
         conditions=_added(start.conditions, logs),
     )
-    return made, notes
+    doubts = [f"{one.doubt[:1].upper()}{one.doubt[1:]}." for one in logs if one.doubt]
+    if made.hull:
+        # A fit refuses such masses.
+        doubts += impossible_masses(profile, ModelForces(made).altered_hull())
+    notes += tuple(f"The model does not become the current one. {one}" for one in dict.fromkeys(doubts))
+    return replace(made, accepted=made.accepted and not doubts), notes
 
 
 def _refitted(logs: Sequence[HullPosterior], model: Model | None) -> dict[str, Quantity]:

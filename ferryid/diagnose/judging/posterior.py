@@ -12,13 +12,11 @@ from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.data.measurements import Survey
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, effect_slopes, fit
 from ferryid.diagnose.inference.stochastic_disturbance import DisturbanceState
+from ferryid.diagnose.judging.credibility import IN_THE_HULL, refitted_hull
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.models import Quantity, Source, StoredEffect, validity_ranges
 from ferryid.types import Floats
-
-IN_THE_HULL = "hull_parameters"
-"""The effect that is nothing but other coefficients of the hull: it becomes these."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +50,9 @@ class Posterior:
     vessel, conditions
         Properties of the vessel and conditions of the log, in the order in which they act.
     hull
-        The hull as the log refitted it; None where it is for a fit to all logs to estimate.
+        The hull as the log refitted it; None where it is for a fit to all logs to estimate, or cannot be the vessel's.
+    doubt
+        Why no model that has this may become the current one, as the end of a sentence; empty where it may.
     notes
         What did not enter and why, as sentences.
     """
@@ -62,6 +62,7 @@ class Posterior:
     vessel: tuple[StoredEffect, ...]
     conditions: tuple[StoredEffect, ...]
     hull: HullPosterior | None = None
+    doubt: str = ""
     notes: tuple[str, ...] = ()
 
 
@@ -71,6 +72,8 @@ def posterior_of(
     states: Sequence[DisturbanceState],
     findings: Sequence[Finding],
     survey: Survey,
+    *,
+    known: bool = True,
 ) -> Posterior | None:
     """Return what a log teaches; None where no force was left out that is more likely than not.
 
@@ -84,6 +87,8 @@ def posterior_of(
         The same as it is told; those that are doubtful there do not count, and the hull is refitted without them.
     survey
         Of the log.
+    known
+        Whether the hull comes from a profile or a model.
     """
     reported = {(one.effect, one.instance): one for one in findings}
     accepted = [i for i, one in enumerate(kept.candidates) if one.key in reported and reported[one.key].sure]
@@ -97,6 +102,8 @@ def posterior_of(
     if len(accepted) < len(kept.candidates):
         kept = fit(problem, [kept.candidates[i] for i in accepted], [kept.values[i] for i in accepted])
     motion, recording = survey.motion, survey.recording
+    # Without what was doubtful, the hull may bend as far as it did with it.
+    doubt = refitted_hull(problem, kept).doubt if known else ""
     stored = []
     for i, candidate in enumerate(kept.candidates):
         if candidate.effect.id != IN_THE_HULL:
@@ -135,7 +142,8 @@ def posterior_of(
         ranges=ranges_of(survey),
         vessel=tuple(one for vessel, one in stored if vessel),
         conditions=tuple(one for vessel, one in stored if not vessel),
-        hull=_hull(problem, kept),
+        hull=None if doubt else _hull(problem, kept),
+        doubt=doubt,
         notes=tuple(notes),
     )
 

@@ -159,12 +159,6 @@ class JudgingThresholds:
         "least turn from the vessel's own headings, root mean square, of headings that make a placebo",
         "convention: a wind that points 30 degrees elsewhere is another wind",
     )
-    at_bound: float = threshold(
-        0.01,
-        "of the range of a parameter",
-        "nearer to an end of it than this, a search was stopped by the bound",
-        "convention: a hundredth",
-    )
     power_in_positions: float = threshold(
         0.5,
         "of what the velocities show",
@@ -200,6 +194,12 @@ class JudgingThresholds:
         "of the formula's uncertainty",
         "least size of an effect that both begins and ends within a log",
         "tuned on cases of `ferryid prove`: a thruster 5 % stronger for a minute was named; the uncertainty is each effect's",
+    )
+    credible_move: float = threshold(
+        10.0,
+        "standard deviations of the prior",
+        "move of a coefficient of the hull beyond which nothing that was estimated beside it is sure or stored",
+        "convention: `hull_spread` of it is more than the whole coefficient; a model that far off is another vessel's",
     )
     worsening: float = threshold(
         0.2,

@@ -55,7 +55,7 @@ def on(kind: Kind, **figures: object) -> Context:
 
 def test_every_rule_has_a_name_a_line_and_its_unit() -> None:
     names = [one.name for one in RULES]
-    assert len(names) == len(set(names)) == 16
+    assert len(names) == len(set(names)) == 18
     for one in RULES:
         assert one.about.endswith((".", ":", ",")) or one.about, one.name
         assert (one.threshold is None) == (one.unit == ""), one.name

@@ -1,0 +1,154 @@
+"""What cannot be true of a vessel whatever the data favour: values at bounds, hulls that are another vessel's, idle effects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ferryid.diagnose.inference.campaign_estimation import CampaignFit
+from ferryid.diagnose.inference.estimation import EstimationProblem, Fit
+from ferryid.diagnose.inference.force_errors import mass_of
+from ferryid.diagnose.inference.thresholds import INFERENCE
+from ferryid.diagnose.judging.thresholds import JUDGING
+from ferryid.effects.effect import Effect, Parameter
+from ferryid.effects.force_model import COEFFICIENTS, UNITS
+from ferryid.identify import inertia_checks
+from ferryid.types import Floats
+from ferryid.vessel.profile import Profile
+
+IN_THE_HULL = "hull_parameters"
+"""The effect that is nothing but other coefficients of the hull: it becomes these."""
+
+
+@dataclass(frozen=True)
+class HullChange:
+    """The coefficient of the hull that a refit moved farthest.
+
+    Attributes
+    ----------
+    coefficient, unit
+        Of `ferryid.effects.force_model.COEFFICIENTS`.
+    before, value
+        What was believed of it, and what came out.
+    deviations
+        The move in standard deviations of what was believed.
+    """
+
+    coefficient: str
+    unit: str
+    before: float
+    value: float
+    deviations: float
+
+
+@dataclass(frozen=True)
+class RefittedHull:
+    """What a refit made of a hull: the coefficient that moved farthest, and why no hull has its masses, as sentences."""
+
+    farthest: HullChange | None = None
+    impossible: tuple[str, ...] = ()
+
+    @property
+    def doubt(self) -> str:
+        """Why it cannot be the vessel's, as the end of a sentence; empty where it can."""
+        if self.farthest is not None and abs(self.farthest.deviations) > JUDGING.credible_move:
+            return (
+                f"beside it, {self.farthest.coefficient} of the hull moves by {abs(self.farthest.deviations):.0f} prior "
+                "standard deviations, which is another vessel's hull"
+            )
+        for reason in self.impossible:
+            return f"beside it, {reason[:1].lower()}{reason[1:].removesuffix('.')}"
+        return ""
+
+
+def refitted_hull(problem: EstimationProblem, kept: Fit, *, known: bool = True) -> RefittedHull:
+    """Return what a fit made of the hull; factors on single coefficients are multiplied into its inertia.
+
+    Of a hull that is not `known`, as nobody has modelled it, what little a log may determine of the inertia is no doubt.
+    """
+    hull = kept.hull.copy()
+    for candidate, values in zip(kept.candidates, kept.values, strict=True):
+        if candidate.effect.id == IN_THE_HULL:
+            for one, factor in zip(candidate.parameters, values.tolist(), strict=True):
+                hull[COEFFICIENTS.index(one.name)] *= factor
+    before, spread = problem.plain.hull, problem.hull_spread
+    return RefittedHull(
+        _farthest(before, spread, kept.hull),
+        impossible_masses(problem.plain.measurements.profile, hull) if known else (),
+    )
+
+
+def campaign_hull(made: CampaignFit) -> RefittedHull:
+    """Return what all logs of a campaign made of the hull; see `refitted_hull`."""
+    prior, h = made.campaign.hull, len(COEFFICIENTS)
+    moved = (prior.mean + prior.spread * made.common[: len(prior.mean)])[:h]
+    profile = made.campaign.members[0].plain.measurements.profile
+    return RefittedHull(
+        _farthest(prior.mean[:h], prior.spread[:h], moved), impossible_masses(profile, moved) if prior.known else ()
+    )
+
+
+def _farthest(before: Floats, spread: Floats, moved: Floats) -> HullChange | None:
+    """Return the coefficient that moved farthest; None where none could move."""
+    free = spread > 0.0
+    if not free.any():
+        return None
+    away = np.divide(moved - before, spread, out=np.zeros_like(moved), where=free)
+    k = int(np.argmax(np.abs(away)))
+    return HullChange(COEFFICIENTS[k], UNITS[k], float(before[k]), float(moved[k]), float(away[k]))
+
+
+def impossible_masses(profile: Profile, hull: Floats) -> tuple[str, ...]:
+    """Return why no hull can have the masses of these coefficients, shape (26,), as a fit judges them, in sentences."""
+    return tuple(one.reason for one in inertia_checks(profile, mass_of(hull)) if not one.passed)
+
+
+def value_doubt(effect: Effect, parameters: Sequence[Parameter], values: Mapping[str, float], profile: Profile) -> str:
+    """Return why the values of an effect are not credible, as the end of a sentence; empty where they are.
+
+    Parameters
+    ----------
+    effect
+        The effect.
+    parameters
+        With their limits.
+    values
+        Those that are reported, by name.
+    profile
+        The vessel.
+    """
+    if doubt := effect.doubt(values, profile):
+        return doubt
+    for one in parameters:
+        if one.name in values and one.at_bound(values[one.name]):
+            return f"its {one.name.replace('_', ' ')} of {values[one.name]:.3g} {one.unit} stands at the bound of its search"
+    return ""
+
+
+def felt(made: CampaignFit, common: Floats, own: Floats) -> Floats:
+    """Return how much of the measured acceleration what sets two estimates apart is, by axis, shape (logs, 3).
+
+    Parameters
+    ----------
+    made
+        One of them.
+    common, own
+        Vectors of the other: of all logs, shape (g,), and of each, shape (logs, l).
+    """
+    shares = []
+    for i, member in enumerate(made.campaign.members):
+        there = made.campaign.gap(i, made.common, made.own[i])
+        moved = there - made.campaign.gap(i, common, own[i])
+        measured = member.windows.along_vessel(member.windows.measured[:, member.windows.channels])
+        size = np.sqrt(np.mean(measured**2, axis=0))
+        shares.append(np.sqrt(np.mean(moved**2, axis=0)) / np.where(size > 0.0, size, np.inf))
+    return np.array(shares)
+
+
+def unfelt(shares: Floats) -> str:
+    """Return that accelerations by an effect, over the measured ones, shape (3,), are too small; empty where one is not."""
+    if (shares >= INFERENCE.void_share).any():
+        return ""
+    return f"it moves the vessel by less than {100.0 * INFERENCE.void_share:g} % of its measured acceleration"

@@ -1,0 +1,233 @@
+"""What cannot be true of a vessel: never sure, never in a model that becomes the current one, and the reason is given."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from ferryid.diagnose.inference.estimation import Candidate
+from ferryid.diagnose.inference.thresholds import INFERENCE
+from ferryid.diagnose.judging.campaign_conditions import ConditionTest
+from ferryid.diagnose.judging.campaign_evidence import Gain, HeldOutLoss
+from ferryid.diagnose.judging.campaign_properties import PropertyTest
+from ferryid.diagnose.judging.claims import Claim, Figures, Kind, LogFigures
+from ferryid.diagnose.judging.confidence_rules import apply_rules
+from ferryid.diagnose.judging.credibility import (
+    RefittedHull,
+    campaign_hull,
+    impossible_masses,
+    refitted_hull,
+    unfelt,
+    value_doubt,
+)
+from ferryid.diagnose.judging.diagnosis import Diagnosis
+from ferryid.diagnose.judging.group_differences import Difference, _doubt
+from ferryid.diagnose.judging.model_update import update_model
+from ferryid.diagnose.judging.posterior import HullPosterior, Posterior
+from ferryid.diagnose.judging.thresholds import JUDGING
+from ferryid.effects import effects
+from ferryid.effects.effect import Parameter
+from ferryid.effects.force_model import COEFFICIENTS, hull_of
+from ferryid.effects.thresholds import EFFECTS
+from ferryid.models import Quantity, Source, StoredEffect
+from ferryid.types import AXES
+from ferryid.vessel import load_profile
+from ferryid.vessel.dimensions import off_hull
+from tests.diagnose.judging.findings import found
+
+FERRY = load_profile("milliampere")
+HULL = hull_of(FERRY)
+LENGTH, BEAM, MASS = FERRY.hull.length_m, FERRY.hull.beam_m, FERRY.hull.mass_kg
+SPREAD = EFFECTS.hull_spread * np.abs(HULL)
+
+
+def doubt(effect: str, **values: float) -> str:
+    known = effects()[effect]
+    return value_doubt(known, known.parameters_of(FERRY), values, FERRY)
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "why"),
+    [
+        ("lever_arm", {"x": 0.49 * LENGTH, "y": -0.49 * BEAM}, ""),
+        ("lever_arm", {"x": 0.51 * LENGTH, "y": 0.0}, "2.55 m ahead of the body origin is off a hull of 5 m"),
+        ("lever_arm", {"x": 0.0, "y": -0.51 * BEAM}, "to port is off a hull that is 2.8 m wide"),
+        ("payload", {"mass": 0.55 * MASS, "x": 0.0}, ""),
+        ("payload", {"mass": 0.94 * MASS, "x": 0.0}, "the load would be 94 % of the vessel's own mass"),
+        ("payload", {"mass": -20.0, "x": 0.0}, "20 kg lighter than it is empty"),
+        ("payload", {"mass": 100.0, "x": 0.5 * LENGTH}, "its x of 2.5 m stands at the bound of its search"),
+        ("payload", {"mass": 100.0, "x": 0.6 * LENGTH}, "ahead of the body origin is off a hull"),
+        ("fouling", {"surge": 1.5, "sway": 5.99}, "its sway of 5.99 - stands at the bound of its search"),
+        ("hull_parameters", {"m11": 0.06}, "its m11 of 0.06 - stands at the bound of its search"),
+        ("thruster_gain", {"factor": 2.99}, "its factor of 2.99 - stands at the bound"),
+        # A thruster may give nothing at all, and a line may hold along one direction alone.
+        ("thruster_gain", {"factor": 0.0}, ""),
+        ("mooring", {"stiffness_north": 0.0, "stiffness_east": 8.0, "north": 3.0, "east": 4.0}, ""),
+        ("time_delay", {"seconds": 0.4}, ""),
+        ("time_delay", {"seconds": -0.4}, "the motion precedes its force"),
+    ],
+)
+def test_a_value_that_no_vessel_has_is_doubted_with_the_reason(effect: str, values: dict[str, float], why: str) -> None:
+    said = doubt(effect, **values)
+    assert why in said
+    assert bool(said) == bool(why)
+
+
+def test_a_hull_about_an_origin_at_the_stern_reaches_farther_ahead() -> None:
+    astern = replace(FERRY, hull=replace(FERRY.hull, x_g_m=0.5 * LENGTH))
+    assert off_hull(astern, 0.9 * LENGTH, 0.0) == ""
+    assert off_hull(FERRY, 0.9 * LENGTH, 0.0) != ""
+    assert off_hull(astern, 1.01 * LENGTH, 0.0) != ""
+
+
+def fitted(hull: Any, *candidates: Any) -> RefittedHull:
+    problem = SimpleNamespace(
+        plain=SimpleNamespace(hull=HULL, measurements=SimpleNamespace(profile=FERRY)), hull_spread=SPREAD
+    )
+    kept = SimpleNamespace(hull=hull, candidates=[one for one, _ in candidates], values=[p for _, p in candidates])
+    return refitted_hull(cast(Any, problem), cast(Any, kept))
+
+
+def moved(coefficient: str, deviations: float) -> Any:
+    return HULL + np.where(np.array(COEFFICIENTS) == coefficient, deviations * SPREAD, 0.0)
+
+
+def test_a_hull_that_moves_ten_deviations_or_is_lighter_than_the_vessel_is_doubted() -> None:
+    assert fitted(moved("Y_v", 9.9)).doubt == ""
+    said = fitted(moved("Y_v", -10.1)).doubt
+    assert said == "beside it, Y_v of the hull moves by 10 prior standard deviations, which is another vessel's hull"
+    least = 0.5 * MASS / HULL[0]
+    factors = Candidate.of(effects()["hull_parameters"], None, FERRY)
+    values = np.array([least if one.name == "m11" else 1.0 for one in factors.parameters])
+    said = fitted(HULL, (factors, values)).doubt
+    assert "the effective inertia in surge is 0.50 times the rigid body's" in said
+    # The factor alone is that much below the model's, which has added mass.
+    values[[one.name for one in factors.parameters].index("m11")] = MASS / HULL[0]
+    assert fitted(HULL, (factors, values)).doubt == ""
+
+
+def test_the_hull_of_a_campaign_is_doubted_as_that_of_a_log_is() -> None:
+    def doubted(deviations: float, *, known: bool) -> str:
+        common = np.where(np.array([*COEFFICIENTS, "X_vr", "X_vv"]) == "m11", deviations, 0.0)
+        prior = SimpleNamespace(mean=np.append(HULL, [0.0, 0.0]), spread=np.append(SPREAD, [1.0, 1.0]), known=known)
+        member = SimpleNamespace(plain=SimpleNamespace(measurements=SimpleNamespace(profile=FERRY)))
+        campaign = SimpleNamespace(hull=prior, members=(member,))
+        return campaign_hull(cast(Any, SimpleNamespace(campaign=campaign, common=common))).doubt
+
+    assert doubted(-1.0, known=True) == ""
+    assert "inertia in surge" in doubted(-6.0, known=True)
+    # Of a hull that nobody has modelled, the logs may say little of the mass.
+    assert doubted(-6.0, known=False) == ""
+    assert "moves by 11 prior" in doubted(11.0, known=False)
+
+
+@pytest.mark.parametrize("kind", ["force", "disturbance", "condition", "property", "sensor"])
+def test_what_is_not_credible_is_a_hint_whatever_shows_it(kind: Kind) -> None:
+    why = "it is off the hull"
+    (one,), notes = apply_rules([Claim(found("thruster_gain"), Figures(kind, doubt=why))], LogFigures())
+    assert one.probability == JUDGING.hint_probability
+    assert notes[0] == "Thruster force (thruster1) is a hint: it is off the hull."
+    (one,), notes = apply_rules([Claim(found("thruster_gain"), Figures(kind))], LogFigures())
+    assert (one.sure, notes) == (True, ())
+
+
+@pytest.mark.parametrize(
+    ("kind", "own", "common"),
+    [("force", False, True), ("law", False, True), ("condition", True, False), ("sensor", True, True)],
+)
+def test_beside_a_hull_that_cannot_be_nothing_is_sure_but_what_kinematics_shows(
+    kind: Kind, own: bool, common: bool
+) -> None:
+    claim = Claim(found("wind"), Figures(kind))
+    assert apply_rules([claim], LogFigures(hull_doubt="no such hull"))[0][0].sure == own
+    findings, notes = apply_rules([claim], LogFigures(common_hull_doubt="no such hull"))
+    assert findings[0].sure == common
+    assert bool(notes) != common
+
+
+def condition(axes: tuple[float, float, float], share: float) -> ConditionTest:
+    """Return a wind that the evidence favours, with the errors that it leaves by axis, of one, and how much it is felt."""
+    plain = SimpleNamespace(hull=np.array([1.0, 1.0, 0.0, 0.0, 1.0]), measurements=SimpleNamespace(profile=FERRY))
+    own = [(0, Parameter(name, "m/s", 4.0, -30.0, 30.0)) for name in ("north", "east")]
+    campaign = SimpleNamespace(members=(SimpleNamespace(plain=plain),) * 2, own=own)
+    fit = SimpleNamespace(campaign=campaign, condition=lambda i, k: (np.array([1.0, 29.9 * i]), np.eye(2)))
+    loss = tuple(
+        HeldOutLoss(np.ones(1), np.zeros(1, dtype=int), (np.ones((4, 3)) * np.sqrt(each),) * 2)
+        for each in ((1.0, 1.0, 1.0), axes)
+    )
+    beaten = SimpleNamespace(beaten=True, own=True)
+    test = ConditionTest(
+        "wind", cast(Any, fit), cast(Any, fit), cast(Any, loss), 50.0, Gain(40.0, 10.0, 70.0), {"m": cast(Any, beaten)}
+    )
+    test.__dict__.update(felt=np.array([[0.0, share, 0.0], [0.0, 0.5 * share, 0.0]]), courses=())
+    return test
+
+
+def test_a_condition_that_makes_an_axis_worse_or_is_not_felt_is_not_confirmed() -> None:
+    least = INFERENCE.void_share
+    assert condition((0.9, 0.8, 1.1), least).confirmed
+    worse = condition((0.9, 0.8, 1.3), least)
+    assert worse.doubt == "it makes the held-out squared force error of the logs in yaw 30 % larger"
+    assert condition((0.9, 0.8, 1.1), 0.9 * least).doubt == (
+        "it moves the vessel by less than 2 % of its measured acceleration"
+    )
+    # What one log has of it is judged by itself: the second has half of it, at the bound of the search.
+    steady = condition((0.9, 0.8, 1.1), 1.5 * least)
+    assert steady.confirmed
+    assert steady.value_doubt(0) == ""
+    assert steady.value_doubt(1) == "its east of 29.9 m/s stands at the bound of its search"
+    steady.__dict__["fit"].condition = lambda i, k: (np.ones(2), np.eye(2))
+    assert "less than 2 %" in steady.value_doubt(1)
+
+
+def test_one_axis_is_enough_to_be_felt() -> None:
+    assert unfelt(np.array([0.0, INFERENCE.void_share, 0.0])) == ""
+    assert unfelt(np.array([0.0, 0.0199, 0.0])) != ""
+
+
+def test_a_property_and_a_difference_that_are_not_credible_are_not_confirmed() -> None:
+    weak = Candidate.of(effects()["thruster_gain"], "thruster1", FERRY)
+    estimates = found("thruster_gain").parameters
+    test = PropertyTest(weak, estimates, 50.0, Gain(40.0, 10.0, 70.0), (3, 3), np.array([0.5, 0.5, 0.5]), ())
+    assert test.confirmed
+    assert replace(test, credibility="nobody has such a thruster").doubt == "nobody has such a thruster"
+    bound = {"factor": replace(estimates["value"], value=2.99, low=2.9, high=3.0)}
+    gain = Gain(40.0, 10.0, 70.0)
+    apart = Difference(weak, bound, 50.0, 0.0, {}, gain, {"A": gain, "B": gain})
+    assert _doubt(apart, True, FERRY) == "its factor of 2.99 - stands at the bound of its search"
+
+
+def taught(hull: Any = None, doubt: str = "") -> Diagnosis:
+    weak = StoredEffect(
+        "thruster_gain", "thruster1", {"factor": Quantity(0.8, 0.7, 0.9, "-")}, (Source("log", "ab", 0.99),)
+    )
+    log = {"name": "log", "files": ["log.mcap"], "sha256": "ab", "seconds": 600.0, "rows": 1200}
+    refitted = None if hull is None else HullPosterior(HULL, SPREAD, hull, np.diag(SPREAD**2))
+    posterior = Posterior(log, {"u": (0.0, 1.0)}, (weak,), (), refitted, doubt)
+    before, after = (dict.fromkeys(AXES, one) for one in (100.0, 40.0))
+    return Diagnosis(
+        "log", FERRY.name, "explained", (), {"mse": before, "rows": 60}, {"mse": after}, posterior=posterior
+    )
+
+
+def test_a_model_of_what_cannot_be_does_not_become_the_current_one() -> None:
+    made, notes = update_model([taught(HULL)], FERRY, None, "boat")
+    assert made is not None
+    assert (made.accepted, notes) == (True, ())
+    light = HULL * np.where(np.array(COEFFICIENTS) == "m11", 0.05, 1.0)
+    assert impossible_masses(FERRY, light)
+    for diagnosis, why in (
+        (taught(light), "The effective inertia in surge is"),
+        (
+            taught(doubt="beside it, Y_v of the hull moves by 14 prior standard deviations"),
+            "Beside it, Y_v of the hull moves",
+        ),
+    ):
+        made, notes = update_model([diagnosis], FERRY, None, "boat")
+        assert made is not None
+        assert not made.accepted
+        assert notes[-1].startswith(f"The model does not become the current one. {why}")
