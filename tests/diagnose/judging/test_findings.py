@@ -15,10 +15,12 @@ from ferryid.diagnose.judging.confidence_rules import Context, apply_rules, impr
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.findings import force_claims
 from ferryid.diagnose.judging.held_out import held_out_evidence
+from ferryid.diagnose.judging.posterior import posterior_of
 from ferryid.diagnose.judging.rivals import RivalComparison
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
 from ferryid.types import AXES
+from tests.diagnose.judging.test_campaign_posterior import survey
 from tests.diagnose.judging.test_held_out import WIND, candidate, sailed, trial_on
 
 pytestmark = pytest.mark.slow
@@ -64,6 +66,39 @@ def test_what_is_seen_to_improve_nothing_that_it_claims_is_a_hint(windy: tuple[E
         "Steady wind is a hint: on the axes that it claims, neither the held-out squared force error nor the free run "
         "improves by an interval that excludes zero."
     )
+
+
+def test_a_value_at_the_bound_of_its_search_is_a_hint(windy: tuple[EstimationProblem, Elimination]) -> None:
+    problem, stands = windy
+    (wind,), (values,) = stands.fit.candidates, stands.fit.values
+    north = replace(wind.parameters[0], low=float(values[0]) - 0.1)
+    bounded = replace(wind, parameters=(north, *wind.parameters[1:]))
+    (proof,) = stands.proof.proofs if stands.proof else ()
+    assert stands.proof is not None
+    stands = replace(
+        stands,
+        fit=replace(stands.fit, candidates=(bounded,)),
+        proof=replace(stands.proof, proofs=(replace(proof, candidate=bounded),)),
+    )
+    finding, (note,) = judged_by_rules(problem, stands)
+    assert finding.probability == JUDGING.hint_probability
+    assert note.startswith("Steady wind is a hint: its north of -")
+    assert note.endswith(" m/s stands at the bound of its search.")
+
+
+def test_a_hull_that_is_another_vessels_is_not_stored(windy: tuple[EstimationProblem, Elimination]) -> None:
+    problem, stands = windy
+    finding, _ = judged_by_rules(problem, stands)
+    known = posterior_of(problem, stands.fit, (), (finding,), survey())
+    assert known is not None
+    assert (known.hull is None, known.doubt) == (False, "")
+    # The same move of a hull that was believed to be known to a thousandth.
+    sure = replace(problem, hull_spread=1e-2 * problem.hull_spread)
+    for is_known, stored in ((True, False), (False, True)):
+        other = posterior_of(sure, stands.fit, (), (finding,), survey(), known=is_known)
+        assert other is not None
+        assert (other.hull is not None) == stored
+        assert ("prior standard deviations" in other.doubt) != stored
 
 
 def test_what_acted_in_a_place_that_was_visited_once_is_a_hint(windy: tuple[EstimationProblem, Elimination]) -> None:
