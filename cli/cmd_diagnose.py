@@ -41,6 +41,9 @@ def command(
     withhold: Annotated[
         list[str] | None, typer.Option(help="A signal to hide, such as wind, and to compare afterwards; repeatable.")
     ] = None,
+    setting: Annotated[
+        str, typer.Option(help="Where the logs were recorded: tank, pond, harbour or sea; the profile's if left out.")
+    ] = "",
     name: Annotated[
         str, typer.Option(help="Name of the model with the findings; the examined model's or the vessel's if left out.")
     ] = "",
@@ -57,7 +60,9 @@ def command(
     from ferryid import api
     from ferryid.diagnose import DiagnosisSettings
 
-    settings = DiagnosisSettings(None, against, each and not together, tuple(withhold or ()), tuple(reference or ()))
+    settings = DiagnosisSettings(
+        None, against, each and not together, tuple(withhold or ()), tuple(reference or ()), setting
+    )
     words = ("ferryid", *sys.argv[1:])
     if versus:
         outcome = api.compare_groups(

@@ -19,11 +19,11 @@ from ferryid.diagnose.judging.learning import Learner, without_withheld
 from ferryid.diagnose.judging.model_update import store_updated_model
 from ferryid.diagnose.second_sources import compare_second_sources
 from ferryid.effects.wording import listed
-from ferryid.errors import FerryIdError
+from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.models import Model
 from ferryid.models.store import check_name
 from ferryid.types import RunContext
-from ferryid.vessel.profile import Profile
+from ferryid.vessel.profile import SETTINGS, Profile
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,8 @@ class DiagnosisSettings:
         Signals to hide from the diagnosis.
     reference
         Further recordings of the vessel, which bring its hull and have no diagnosis of their own.
+    setting
+        Where the logs were recorded, one of `ferryid.vessel.profile.SETTINGS`; as the profile has it where empty.
     """
 
     model: Model | None = None
@@ -49,9 +51,19 @@ class DiagnosisSettings:
     each: bool = False
     withhold: tuple[str, ...] = ()
     reference: tuple[str, ...] = ()
+    setting: str = ""
+
+    def recorded(self, profile: Profile) -> Profile:
+        """Return a vessel as it was where the logs were recorded."""
+        return replace(profile, setting=self.setting) if self.setting else profile
 
     def check(self) -> None:
-        """Refuse two things to compare with at once."""
+        """Refuse two things to compare with at once, and a setting that there is none of."""
+        if self.setting and self.setting not in SETTINGS:
+            raise FerryIdError(
+                f'diagnose: there is no setting "{self.setting}".{did_you_mean(self.setting, SETTINGS)} '
+                f"Fix: use one of {', '.join(SETTINGS)}"
+            )
         if self.against is not None and self.model is not None:
             raise FerryIdError(
                 "diagnose: a recording is compared with one thing at a time, found both --model and --against. "
@@ -88,6 +100,7 @@ def diagnose_campaign(
     FerryIdError
         Where no log can be used. Of several, those that cannot are left out, and the notes name them.
     """
+    profile = settings.recorded(profile)
     groups = _groups(logs, _references(logs, profile, settings, run), profile, settings, run)
     found = _diagnosed(groups, profile, settings, run)
     return tuple(sorted(found, key=lambda one: list(logs).index(one.path)))

@@ -89,6 +89,8 @@ def compare_groups(
         For a log in both groups, a group without a log that can be used, and settings that compare with something else.
     """
     _check(logs, versus, settings)
+    settings.check()
+    profile = settings.recorded(profile)
     averaged, notes = list[AveragedLog](), list[str]()
     name_of: dict[str, str] = {}
     for group, paths in zip(GROUPS, (logs, versus), strict=True):

@@ -64,4 +64,5 @@ EFFECT = Effect(
     turbulence=Turbulence(EFFECTS.current_turbulence, EFFECTS.least_current_std, EFFECTS.current_length),
     absent_in=("tank",),
     rare_in=("pond",),
+    common_in=("sea",),
 )

@@ -197,9 +197,9 @@ class Effect:
         others are the vessel's. Empty for what is no such condition.
     turbulence
         How such a condition changes within a log; None for one that is taken as steady.
-    absent_in, rare_in
-        Settings of a profile (`ferryid.vessel.profile.SETTINGS`) in which there is no such thing, so that it is not tested, and
-        in which it is less likely than elsewhere.
+    absent_in, rare_in, common_in
+        Settings of a profile (`ferryid.vessel.profile.SETTINGS`) in which there is no such thing, so that it is not tested, in
+        which it is less likely than where the setting is not known, and in which it is more likely.
     about
         Id of the effect about which an unsteady one comes and goes, and beside which it is looked for.
     regressor
@@ -238,6 +238,7 @@ class Effect:
     turbulence: Turbulence | None = None
     absent_in: tuple[str, ...] = ()
     rare_in: tuple[str, ...] = ()
+    common_in: tuple[str, ...] = ()
     about: str = ""
     regressor: Callable[[ForceModel, Floats, str | None, str], tuple[str, Floats]] | None = None
     simulated: Simulated | None = None
@@ -267,7 +268,12 @@ class Effect:
         return isfinite(self.longest_s)
 
     def log_rarity(self, profile: Profile) -> float:
-        """Return by how much its log prior odds are lower in the profile's setting than elsewhere [nat]."""
+        """Return by how much its log prior odds are lower in the profile's setting than in an unknown one [nat].
+
+        Negative where it is common.
+        """
+        if profile.setting in self.common_in:
+            return -EFFECTS.commonness
         return EFFECTS.rarity if profile.setting in self.rare_in else 0.0
 
     @property

@@ -92,4 +92,6 @@ EFFECT = Effect(
     regressor=regressor,
     formula_error=EFFECTS.load_error,
     simulated=Simulated(load),
+    rare_in=("tank", "pond", "sea"),
+    common_in=("harbour",),
 )

@@ -175,4 +175,6 @@ EFFECT = Effect(
     in_part=True,
     negligible=EFFECTS.least_shallow,
     changes_hull=True,
+    rare_in=("tank", "sea"),
+    common_in=("pond", "harbour"),
 )

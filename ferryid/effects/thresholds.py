@@ -35,6 +35,12 @@ class EffectThresholds:
         "how much lower the log prior odds of an effect are in a setting in which it is rare, such as a current in a pond",
         "convention: odds of 1 : 20",
     )
+    commonness: float = threshold(
+        2.0,
+        "nat",
+        "how much higher the log prior odds of an effect are in a setting in which it is common, such as waves at sea",
+        "convention: odds of 7 : 1; less than `rarity`, as what is common outdoors is usual where no setting is known, too",
+    )
     formula_error: float = threshold(
         0.1,
         "of what the effect changes",

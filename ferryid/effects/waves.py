@@ -83,4 +83,16 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     }
 
 
-EFFECT = Effect("waves", "Waves", parameters_of, apply, says, scenario, in_part=True, unsteady=unsteady)
+EFFECT = Effect(
+    "waves",
+    "Waves",
+    parameters_of,
+    apply,
+    says,
+    scenario,
+    in_part=True,
+    unsteady=unsteady,
+    # A tank may have a wave maker.
+    rare_in=("tank", "pond"),
+    common_in=("sea",),
+)

@@ -140,4 +140,5 @@ EFFECT = Effect(
     of_log=("north", "east"),
     turbulence=Turbulence(EFFECTS.wind_turbulence, EFFECTS.least_wind_std, EFFECTS.wind_length),
     absent_in=("tank",),
+    common_in=("pond", "harbour", "sea"),
 )

@@ -129,7 +129,7 @@ def resolved(pair: Pair) -> str:
 
 
 def _row(likeness: Likeness, pair: Pair) -> dict[str, str]:
-    between = separation(pair.first, pair.second)
+    between = separation(pair.first, pair.second, likeness.setting)
     return {
         "names": names(likeness, pair),
         "likeness": _value(pair),

@@ -64,7 +64,8 @@ def fit_disturbances(
 ) -> tuple[EstimationProblem, tuple[DisturbanceState, ...]]:
     """Return the trial with the disturbances in its filter that what a fit leaves speaks for, and these.
 
-    Each is weighed by its likelihood, at its most likely parameters and noise, less Schwarz's penalty for its parameters.
+    Each is weighed by its likelihood, at its most likely parameters and noise, less Schwarz's penalty for its parameters and
+    what its prior odds are lower where the log was recorded.
 
     Parameters
     ----------
@@ -99,7 +100,7 @@ def fit_disturbances(
                 continue
             places = before.get(candidate.key, _starts(candidate))
             start = max(places, key=lambda one: _log_likelihood(steps, gaps, noise, processes(one), force_model))
-            penalty = 0.5 * len(start) * log(len(steps.starts))
+            penalty = 0.5 * len(start) * log(len(steps.starts)) + candidate.log_alternatives
             fitted_noise, values, widths, after = fit_noise_with(
                 steps, gaps, noise, processes, start, force_model, best + penalty + required_gain
             )

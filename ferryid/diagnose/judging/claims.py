@@ -95,6 +95,8 @@ class LogFigures:
         Lasting properties of the vessel that each log of the campaign shows, this log's among them.
     baseline_sensors
         Sensor errors that the simulation has which the log is compared with: parameters by effect.
+    setting
+        Where it was recorded; empty where that is not known.
     hull_doubt, common_hull_doubt
         Why the hull that was refitted to the log, and the one that was fitted to all logs of a campaign, cannot be the
         vessel's, as the end of a sentence; empty where they can.
@@ -106,5 +108,6 @@ class LogFigures:
     unsteady: bool = False
     campaign: tuple[frozenset[Key], ...] = ()
     baseline_sensors: Mapping[str, Mapping[str, Estimate]] = field(default_factory=dict)
+    setting: str = ""
     hull_doubt: str = ""
     common_hull_doubt: str = ""

@@ -40,6 +40,12 @@ from ferryid.diagnose.judging.posterior import posterior_of
 from ferryid.diagnose.judging.verdict import Remainder, verdict_of
 from ferryid.types import AXES, Floats
 
+TEN_MINUTES = {
+    "": "Record at least ten minutes that excite every axis.",
+    "tank": "Record further runs that excite every axis, ten minutes in all, and give all of them together.",
+}
+"""What to record where a log is too short; by setting, the empty one for any other. A tank's length ends a run."""
+
 
 def conclude(
     logs: Sequence[AveragedLog],
@@ -131,12 +137,13 @@ def _too_short(
     together: JudgedCampaign | None,
 ) -> Diagnosis:
     screened = log.screened
-    figures = replace(shared, joint=baseline.joint, baseline_sensors=baseline.sensors)
+    setting = screened.measurements.profile.setting
+    figures = replace(shared, joint=baseline.joint, baseline_sensors=baseline.sensors, setting=setting)
     findings, notes = apply_rules(claims, figures)
     profile, window_s = screened.measurements.profile, _window_s(log.windows.weight, log.windows.measurements.step_s)
     short = (
         f"Only {counted(len(log.windows.starts), 'stretch')} of {window_s:.0f} s without a gap: too few for a conclusion. "
-        "Record at least ten minutes that excite every axis."
+        f"{TEN_MINUTES.get(setting, TEN_MINUTES[''])}"
     )
     remainder = Remainder(testable=False)
     errors = None if together is None else together.errors(log.path, findings)
@@ -197,7 +204,7 @@ def _concluded(
         *rule_notes,
         *log_notes(figures),
         *untested_notes(selected.search.untested),
-        *recording_advice(chances, still),
+        *recording_advice(chances, still, measurements.profile.setting),
     )
     updates = estimated.baseline.updates_model
     return Diagnosis(

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from ferryid.counts import counted
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.claims import Claim, Figures, LogFigures
+from ferryid.diagnose.judging.experiment_design import CALM, HULL_FIRST, fitting
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
@@ -253,9 +254,7 @@ def hull_from_this_log(finding: Finding, context: Context, _threshold: float) ->
     guessed = {"force": not context.log.joint, "disturbance": True}.get(context.own.kind, False)
     if context.log.hull_known or not guessed:
         return finding, ""
-    return lowered(
-        finding, "hull_parameters", manoeuvre="a log in calm air and still water, to fit a hull model first"
-    ), ""
+    return lowered(finding, "hull_parameters", manoeuvre=fitting(HULL_FIRST, context.log.setting)), ""
 
 
 @rule()
@@ -296,7 +295,9 @@ def out_of_step_beside_disturbance(finding: Finding, context: Context, threshold
     removes = max(context.own.removed.values(), default=0.0)
     if not context.log.unsteady or finding.effect not in OUT_OF_STEP or removes >= threshold:
         return finding, ""
-    return lowered(finding, "gusts", manoeuvre="the same manoeuvres in calm air"), ""
+    here = context.log.setting
+    unsteady = "waves" if here in effects()["gusts"].absent_in else "gusts"
+    return lowered(finding, unsteady, manoeuvre=fitting(CALM, here)), ""
 
 
 @rule()

@@ -21,7 +21,7 @@ from ferryid.diagnose.inference.estimation import (
     fitted_force_model,
 )
 from ferryid.diagnose.inference.thresholds import INFERENCE
-from ferryid.diagnose.judging.experiment_design import OTHERWISE, SHOWS
+from ferryid.diagnose.judging.experiment_design import shown_by
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS
@@ -56,8 +56,8 @@ def detection_powers(problem: EstimationProblem, kept: Fit, library: Sequence[Ca
     With d the change of the whitened prediction errors that the effect makes at its usual size, N what hull and findings do,
     each within its prior, and S the information on the effect's parameters beside a prediction error of covariance ``C = I +
     NN'``, the logarithm of the marginal evidence is normal about ``½ d'C⁻¹d - ½ z'z - ½ log det(I + S)`` with a variance of
-    ``d'C⁻¹d``; z are the parameters in their sizes. It has to exceed `INFERENCE.prior_odds`. Of effects that may go either way
-    the less visible one counts.
+    ``d'C⁻¹d``; z are the parameters in their sizes. It has to exceed `INFERENCE.prior_odds`, and by as
+    much more as the effect is rare where the log was recorded. Of effects that may go either way the less visible one counts.
 
     Parameters
     ----------
@@ -98,7 +98,8 @@ def detection_powers(problem: EstimationProblem, kept: Fit, library: Sequence[Ca
             strength = float(change @ apart(change))
             occam = float(np.linalg.slogdet(np.eye(len(size)) + information)[1])
             evidence = 0.5 * (strength - len(size) - occam)
-            chance = min(chance, 0.5 * (1.0 + erf((evidence - INFERENCE.prior_odds) / sqrt(2.0 * max(strength, 1.0)))))
+            above = evidence - INFERENCE.prior_odds - candidate.log_alternatives
+            chance = min(chance, 0.5 * (1.0 + erf(above / sqrt(2.0 * max(strength, 1.0)))))
         else:
             made.append(DetectionPower(candidate, chance))
     return tuple(made)
@@ -135,8 +136,8 @@ def is_testable(every: Sequence[DetectionPower], axes: Sequence[str]) -> bool:
     return 2 * sum(one.chance >= JUDGING.detection_chance for one in every) > len(every) and len(axes) < len(AXES)
 
 
-def recording_advice(every: Sequence[DetectionPower], axes: Sequence[str]) -> list[str]:
-    """Return what the log could not show, and what to record next, in sentences; each effect and manoeuvre once."""
+def recording_advice(every: Sequence[DetectionPower], axes: Sequence[str], setting: str = "") -> list[str]:
+    """Return what a log from some setting could not show, and what to record next, in sentences; each thing once."""
     sentences = []
     if axes:
         what = " and ".join(axes)
@@ -147,7 +148,7 @@ def recording_advice(every: Sequence[DetectionPower], axes: Sequence[str]) -> li
     by_manoeuvre: dict[str, dict[str, list[str]]] = {}
     for one in every:
         if one.chance < JUDGING.detection_chance:
-            known = by_manoeuvre.setdefault(SHOWS.get(one.candidate.effect.id, OTHERWISE), {})
+            known = by_manoeuvre.setdefault(shown_by(one.candidate.effect.id, setting), {})
             known.setdefault(one.candidate.effect.title.lower(), []).extend(filter(None, [one.candidate.instance]))
     if by_manoeuvre:
         parts = [

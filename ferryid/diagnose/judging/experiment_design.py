@@ -4,6 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
+from ferryid.effects import effects
+
+CALM = "the same manoeuvres in calm air"
+"""What shows a delay or a lag that a controller's answer to gusts looks like."""
+HULL_FIRST = "a log in calm air and still water, to fit a hull model first"
 TURN = "a slow turn on the spot through all headings, then straight runs at several speeds both ways"
 STEPS = "steps of the thrusters' speed and angle from rest"
 SINGLE = "each thruster alone, at several speeds and angles, ahead and astern"
@@ -65,8 +70,8 @@ PAIRS: tuple[tuple[frozenset[str], str], ...] = (
     (frozenset({"heading_bias", "wind"}), TURN),
     (frozenset({"heading_bias", "lever_arm"}), STRAIGHT),
     (frozenset({"gusts", "waves"}), "the same manoeuvres in shelter, with a wind sensor aboard"),
-    (frozenset({"gusts", "time_delay"}), "the same manoeuvres in calm air"),
-    (frozenset({"gusts", "thruster_lag"}), "the same manoeuvres in calm air"),
+    (frozenset({"gusts", "time_delay"}), CALM),
+    (frozenset({"gusts", "thruster_lag"}), CALM),
     (frozenset({"waves", "time_delay"}), "the same manoeuvres in still water"),
     (frozenset({"waves", "thruster_lag"}), "the same manoeuvres in still water"),
     (frozenset({"thruster_gain", "azimuth_offset"}), SINGLE),
@@ -170,7 +175,52 @@ SENSORS = {
 OTHERWISE = "a calibration run that excites every axis at many headings"
 
 
-def manoeuvre(effect: str, rivals: Collection[str]) -> str | None:
+FITTING: dict[str, tuple[tuple[str, str], ...]] = {
+    "tank": (
+        (CALM, "the same manoeuvres with the water at rest"),
+        (HULL_FIRST, "further logs with the water at rest, to fit a hull model first"),
+        ("the same manoeuvres in still water", "the same manoeuvres with the water at rest"),
+        ("station keeping in that sea", "station keeping in these waves"),
+        ("long straight runs", "straight runs over the length of the tank"),
+        ("pulling at a quay with a load cell", "pulling at a load cell on the side of the tank"),
+        ("coasting to a stop from full speed", "coasting to a stop from the full speed that the length allows"),
+        (ELSEWHERE, "the same manoeuvres at another depth of the water"),
+        ("the same runs in deep and in shallow water", "the same runs at two depths of the water"),
+    ),
+    "pond": (
+        ("station keeping in that sea", "station keeping in these waves"),
+        ("long straight runs", "straight runs over the length of the pond"),
+        ("pulling at a quay with a load cell", "pulling at a load cell on the bank"),
+    ),
+    "harbour": (("station keeping in that sea", "station keeping in these waves"),),
+    "sea": (
+        (CALM, "the same manoeuvres in shelter or on a calm day"),
+        (HULL_FIRST, "a log in shelter or on a calm day at slack water, to fit a hull model first"),
+        ("the same manoeuvres in still water", "the same manoeuvres in shelter or on a calm day"),
+    ),
+}
+"""By setting, what advice for anywhere becomes there: what the place does not have is not asked for."""
+
+
+def fitting(advice: str, setting: str) -> str:
+    """Return advice as it fits a setting of `ferryid.vessel.profile.SETTINGS`; as it stands where that is not known."""
+    for general, there in FITTING.get(setting, ()):
+        advice = advice.replace(general, there)
+    return advice
+
+
+def shown_by(effect: str, setting: str = "") -> str:
+    """Return what a log from some setting has to hold to show an effect by itself."""
+    return fitting(SHOWS.get(effect, OTHERWISE), setting)
+
+
+def sensor_of(effect: str, setting: str = "") -> str:
+    """Return what measures an effect; empty where nothing does, or the setting does not have it."""
+    known = effects().get(effect)
+    return "" if known is not None and setting in known.absent_in else SENSORS.get(effect, "")
+
+
+def manoeuvre(effect: str, rivals: Collection[str], setting: str = "") -> str | None:
     """Return what to record to tell an effect from its rivals; None where there is nothing to tell apart.
 
     A pair without a manoeuvre of its own is told apart by what shows the one and what shows the other.
@@ -182,4 +232,4 @@ def manoeuvre(effect: str, rivals: Collection[str]) -> str | None:
     for rival in rivals:
         pair = frozenset({effect, rival})
         manoeuvres += [known[pair]] if pair in known else [SHOWS.get(one, OTHERWISE) for one in (effect, rival)]
-    return "; ".join(dict.fromkeys(manoeuvres))
+    return fitting("; ".join(dict.fromkeys(manoeuvres)), setting)

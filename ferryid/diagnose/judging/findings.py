@@ -99,7 +99,7 @@ def _force_claim(
         held_out=proof is not None,
         rivals=rivals,
         unresolved_with=unresolved,
-        separating_manoeuvre=manoeuvre(candidate.effect.id, unresolved),
+        separating_manoeuvre=manoeuvre(candidate.effect.id, unresolved, measurements.profile.setting),
         says=candidate.effect.says(reported, candidate.instance) if reported else "",
         **figure_columns(
             problem, place, figure_regressor(candidate, fitted_force_model(problem.plain, bare), values, place)

@@ -64,6 +64,8 @@ class Difference:
         What was tried in its place, with the evidence over it [nat].
     doubt
         Why it is not confirmed, as the end of a sentence; empty where it is.
+    setting
+        Where the logs were recorded; empty where that is not known.
     """
 
     candidate: Candidate
@@ -75,6 +77,7 @@ class Difference:
     by_group: Mapping[str, Gain] | None = None
     rivals: tuple[Rival, ...] = ()
     doubt: str = ""
+    setting: str = ""
 
     @property
     def group(self) -> str:
@@ -102,7 +105,7 @@ class Difference:
     @property
     def separating_manoeuvre(self) -> str | None:
         """What to record to separate it from these."""
-        return manoeuvre(self.candidate.effect.id, self.unresolved_with)
+        return manoeuvre(self.candidate.effect.id, self.unresolved_with, self.setting)
 
     @property
     def says(self) -> str:
@@ -209,6 +212,7 @@ def _judged(made: CampaignFit, candidate: Candidate, contenders: Sequence[Conten
     by_group = {group: Gain.of(gains[groups == group]) for group in GROUPS}
     found = replace(found, gain=Gain.of(gains), by_group=by_group, rivals=_rivals(candidate, contenders))
     profile = made.campaign.members[0].plain.measurements.profile
+    found = replace(found, setting=profile.setting)
     return replace(found, doubt=_doubt(found, made.campaign.hull.known, profile))
 
 

@@ -84,6 +84,7 @@ def _judged(
         velocity_noise=velocity_noise_shares(problem),
         unsteady=unknown.unsteady or bool(states),
         baseline_sensors=baseline.sensors,
+        setting=measurements.profile.setting,
         hull_doubt=refitted_hull(problem, stands.fit, known=baseline.hull_known).doubt,
     )
     return JudgedLog(log, base, stands, unknown, claims, figures)

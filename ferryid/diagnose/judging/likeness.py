@@ -21,7 +21,7 @@ from scipy.cluster.hierarchy import leaves_list, linkage
 from scipy.spatial.distance import squareform
 
 from ferryid.diagnose.judging.campaign import JudgedCampaign
-from ferryid.diagnose.judging.experiment_design import SENSORS, manoeuvre
+from ferryid.diagnose.judging.experiment_design import manoeuvre, sensor_of
 from ferryid.diagnose.judging.judge import JudgedLog
 from ferryid.diagnose.judging.responses import ROUNDING, Key, Responses, has_response, responses, together
 from ferryid.diagnose.judging.thresholds import JUDGING
@@ -101,11 +101,14 @@ class Likeness:
         Likeness of every two, in the same order, shape (n, n), ones on the diagonal.
     pairs
         Every two of them, the most alike first.
+    setting
+        Where the logs were recorded; empty where that is not known.
     """
 
     effects: tuple[EffectVisibility, ...]
     matrix: Floats
     pairs: tuple[Pair, ...]
+    setting: str = ""
 
     @property
     def alike(self) -> tuple[Pair, ...]:
@@ -149,7 +152,7 @@ def likeness(found: Responses) -> Likeness:
         if i < j
     ]
     pairs.sort(key=lambda pair: -pair.likeness)
-    return Likeness(tuple(effects), matrix, tuple(pairs))
+    return Likeness(tuple(effects), matrix, tuple(pairs), found.setting)
 
 
 def cosine(across: Floats) -> float:
@@ -194,10 +197,10 @@ class Separation:
     sensor: str
 
 
-def separation(first: Key, second: Key) -> Separation:
-    """Return what separates two effects."""
-    sensors = dict.fromkeys(SENSORS[effect] for effect, _ in (first, second) if effect in SENSORS)
-    return Separation(manoeuvre(first[0], [second[0]]) or "", " or ".join(sensors))
+def separation(first: Key, second: Key, setting: str = "") -> Separation:
+    """Return what separates two effects in a setting."""
+    sensors = dict.fromkeys(sensor for effect, _ in (first, second) if (sensor := sensor_of(effect, setting)))
+    return Separation(manoeuvre(first[0], [second[0]], setting) or "", " or ".join(sensors))
 
 
 def likeness_of_logs(
@@ -245,12 +248,12 @@ def likeness_as_json(found: Likeness) -> dict[str, Any]:
             }
             for one in found.effects
         ],
-        "pairs": [_pair_as_json(one) for one in found.pairs],
+        "pairs": [_pair_as_json(one, found.setting) for one in found.pairs],
     }
 
 
-def _pair_as_json(pair: Pair) -> dict[str, Any]:
-    between = separation(pair.first, pair.second) if pair.alike else None
+def _pair_as_json(pair: Pair, setting: str) -> dict[str, Any]:
+    between = separation(pair.first, pair.second, setting) if pair.alike else None
     return {
         "effects": [{"effect": effect, "instance": instance} for effect, instance in (pair.first, pair.second)],
         "likeness": pair.likeness,

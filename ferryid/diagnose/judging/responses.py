@@ -43,6 +43,8 @@ class Responses:
         Prior standard deviations of the hull's coefficients, shape (26,), in which their columns are.
     products
         Shape (26 + q, 26 + q); the columns of effects are for a parameter of usual size.
+    setting
+        Where the logs were recorded; empty where that is not known.
     """
 
     titles: Mapping[Key, str]
@@ -50,6 +52,7 @@ class Responses:
     parameters: tuple[tuple[Key, str], ...]
     hull_spread: Floats
     products: Floats
+    setting: str = ""
 
     def with_hull_spread(self, spread: Floats) -> Responses:
         """Return the same with another prior of the hull; a coefficient that could not move before still cannot."""
@@ -95,7 +98,8 @@ def responses(problem: EstimationProblem, base: Fit, candidates: Sequence[Candid
         titles[candidate.key] = titled(candidate.effect.title, candidate.instance)
         errors[candidate.key] = candidate.effect.formula_error
     every = np.column_stack(columns)
-    return Responses(titles, errors, tuple(parameters), problem.hull_spread, every.T @ every)
+    setting = problem.plain.measurements.profile.setting
+    return Responses(titles, errors, tuple(parameters), problem.hull_spread, every.T @ every, setting)
 
 
 def _response(problem: EstimationProblem, force_model: ForceModel, candidate: Candidate) -> tuple[list[str], Floats]:
@@ -168,4 +172,4 @@ def together(every: Iterable[Responses], hull_spread: Floats | None = None) -> R
         total[np.ix_(places, places)] += one.with_hull_spread(spread).products
     titles = {key: title for one in parts for key, title in one.titles.items()}
     errors = {key: error for one in parts for key, error in one.errors.items()}
-    return Responses(titles, errors, tuple(names), spread, total)
+    return Responses(titles, errors, tuple(names), spread, total, parts[0].setting)

@@ -223,7 +223,11 @@ def test_a_force_is_a_hint_where_only_the_log_itself_tells_of_the_hull(
     assert judged is not None
     assert judged.probability == 0.2
     assert judged.unresolved_with == ("current", "hull_parameters")
-    assert "to fit a hull model first" in str(judged.separating_manoeuvre)
+    assert judged.separating_manoeuvre == "a log in calm air and still water, to fit a hull model first"
+    tank = LogFigures(hull_known=False, setting="tank")
+    judged, _ = hull_from_this_log(found("payload", 0.2), Context(Figures("force"), tank))
+    assert judged is not None
+    assert judged.separating_manoeuvre == "further logs with the water at rest, to fit a hull model first"
     assert bool(log_notes(figures)) == (not known and not joint)
 
 
@@ -258,6 +262,11 @@ def test_what_a_controllers_answer_looks_like_is_a_hint_beside_gusts(effect: str
     judged, _ = out_of_step_beside_disturbance(found(effect), context(0.3))
     assert judged is not None
     assert ("gusts" in judged.unresolved_with) != sure
+    for setting, beside, how in (("tank", "waves", "the water at rest"), ("sea", "gusts", "calm day")):
+        there = replace(context(0.3), log=LogFigures(unsteady=True, setting=setting))
+        lower, _ = out_of_step_beside_disturbance(found(effect), there)
+        assert lower is not None
+        assert (beside in lower.unresolved_with and how in str(lower.separating_manoeuvre)) != sure
     assert stands(out_of_step_beside_disturbance, found(effect), context(0.5))
     assert stands(out_of_step_beside_disturbance, found(effect), context(0.3, unsteady=False))
 
