@@ -254,7 +254,9 @@ def _long_runs(time_s: Floats, repeats: Flags, at_rest: Flags, longest_s: float)
     return old
 
 
-def require_excited(track: Track, nu: Floats, tau: Floats, *, sway_measured: bool = True) -> None:
+def require_excited(
+    track: Track, nu: Floats, tau: Floats, *, sway_measured: bool = True, steady_force: bool = False
+) -> None:
     """Refuse signals from which nothing can be identified.
 
     Parameters
@@ -265,11 +267,13 @@ def require_excited(track: Track, nu: Floats, tau: Floats, *, sway_measured: boo
         Unsmoothed velocity and applied force, shape (n, 3).
     sway_measured
         False for a sway velocity that stands as zero, which is then not asked for.
+    steady_force
+        True where a force that never changes is enough, as a turning circle shows what drives it off; none at all is not.
 
     Raises
     ------
     FerryIdError
-        Where surge, sway or yaw rate is constant over the whole log, or the applied force is.
+        Where surge, sway or yaw rate is constant over the whole log, or the applied force is, or there is none.
     """
     rows = track.valid
     for name, values, unit in zip(("u", "v", "r"), nu.T, ("m/s", "m/s", "rad/s"), strict=True):
@@ -280,7 +284,7 @@ def require_excited(track: Track, nu: Floats, tau: Floats, *, sway_measured: boo
                 f"Fix: check that the profile maps the right field{surge_alone}, or use a log in which the vessel moves in "
                 "every axis"
             )
-    if np.all(np.ptp(tau[rows], axis=0) == 0.0):
+    if np.all(np.ptp(tau[rows], axis=0) == 0.0) and not (steady_force and tau[rows][0].any()):
         force = ", ".join(f"{value:g}" for value in tau[rows][0])
         raise FerryIdError(
             f"{track.log}: constant signal, the applied force never changes, found ({force}) N, N, N·m throughout. "

@@ -45,8 +45,8 @@ class Measured:
     sway_measured: bool = True
 
 
-def measure(track: Track, profile: Profile) -> Measured:
-    """Return unsmoothed velocities and forces of a track.
+def measure(track: Track, profile: Profile, *, steady_force: bool = False) -> Measured:
+    """Return unsmoothed velocities and forces of a track; with `steady_force`, of one whose force never changes, too.
 
     Raises
     ------
@@ -79,7 +79,7 @@ def measure(track: Track, profile: Profile) -> Measured:
             f"{track.log}: no row has both velocity and applied force, found "
             f"{counted(int(np.count_nonzero(track.valid)), 'aligned row')}. Fix: check the actuator signals in the profile"
         )
-    require_excited(track, nu, tau, sway_measured=profile.measures_sway)
+    require_excited(track, nu, tau, sway_measured=profile.measures_sway, steady_force=steady_force)
     unknown = LeftOut.of(
         "wind, current or payload was not measured, or the force cannot be computed",
         track.valid & ~usable,

@@ -108,6 +108,7 @@ NO_DECISION = {
         diagnose.inference.change_points LEVELS
         diagnose.inference.estimation MAX_ITERATIONS HULL_SLOPE_ITERATIONS CONVERGED_GAIN HULL_DIFFERENCE DAMPINGS
         diagnose.inference.estimation PARAMETER_DIFFERENCE LONGEST_STEP
+        diagnose.judging.held_out IMITATION_STEPS IMITATION_DIFFERENCE
         diagnose.inference.kalman CONVERGED
         diagnose.inference.noise_estimation START_SHARES DIFFERENCE_STEP FIRST_DAMPING LEAST_DAMPING LARGEST_DAMPING
         diagnose.inference.noise_estimation LONGEST_STEP SUFFICIENT_GAIN

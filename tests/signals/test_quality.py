@@ -143,6 +143,12 @@ def test_constant_signals_are_refused() -> None:
             require_excited(track, flat, tau)
     with pytest.raises(FerryIdError, match=r"trial: constant signal, the applied force never changes.*Fix: "):
         require_excited(track, nu, np.ones_like(nu))
+    # A diagnosis takes it, as what drives a vessel off shows all the same; no force at all may not have been recorded.
+    require_excited(track, nu, np.ones_like(nu), steady_force=True)
+    with pytest.raises(
+        FerryIdError, match=r"trial: constant signal, the applied force never changes, found \(0, 0, 0\)"
+    ):
+        require_excited(track, nu, np.zeros_like(nu), steady_force=True)
 
 
 @pytest.mark.parametrize("samples", [1, 2, 3])

@@ -141,7 +141,7 @@ def read_measurements(
         check_sampling(recording, profile)
         faults = find_faults(recording)
         track, hidden = _without(align(recording, profile, faults=faults), withhold)
-        measured = measure(track, profile)
+        measured = measure(track, profile, steady_force=True)
     except FerryIdError as error:
         if not (why := artificial(recording)):
             raise

@@ -108,19 +108,25 @@ def held_out_blocks(windows: Windows) -> Iterator[tuple[slice, slice]]:
 def placebos(campaign: Campaign) -> dict[str, Campaign]:
     """Return the campaign with conditions that cannot be true: on the mirrored heading, and on that of another log.
 
-    Headings that are all but the vessel's own, as those of logs of one manoeuvre, make none.
+    Headings that are all but the vessel's own, as those of logs of one manoeuvre, make none; nor do those of another log that
+    differ by the same angle all along, as in turning circles: from another side, the condition is the same on them.
     """
     every = [member.windows.measurements.psi for member in campaign.members]
     others = [np.resize(every[(i + 1) % len(every)], len(psi)) for i, psi in enumerate(every)]
     headings = {MIRRORED: [-psi for psi in every], EXCHANGED: others}
-    return {
-        name: _turned(campaign, found) for name, found in headings.items() if _turn(every, found) > JUDGING.placebo_turn
-    }
+    turns = {MIRRORED: _turn(every, headings[MIRRORED]), EXCHANGED: _turn(every, headings[EXCHANGED], steady=True)}
+    return {name: _turned(campaign, found) for name, found in headings.items() if turns[name] > JUDGING.placebo_turn}
 
 
-def _turn(headings: Sequence[Floats], others: Sequence[Floats]) -> float:
-    """Return how far headings of several logs [rad] point away from others, root mean square [deg]."""
-    apart = np.concatenate([one - other for one, other in zip(headings, others, strict=True)])
+def _turn(headings: Sequence[Floats], others: Sequence[Floats], *, steady: bool = False) -> float:
+    """Return how far headings of several logs [rad] point away from others, root mean square [deg].
+
+    With `steady`, but for the angle of each log by which they do so on average.
+    """
+    each = [one - other for one, other in zip(headings, others, strict=True)]
+    if steady:
+        each = [one - np.angle(np.nanmean(np.exp(1j * one))) for one in each]
+    apart = np.concatenate(each)
     away = (apart[np.isfinite(apart)] + np.pi) % (2.0 * np.pi) - np.pi
     return float(np.degrees(np.sqrt(np.mean(away**2)))) if away.size else 0.0
 

@@ -38,6 +38,8 @@ from ferryid.effects.force_model import ForceModel, as_measured
 from ferryid.types import Floats
 
 HEADING = "heading mirrored"
+IMITATION_STEPS, IMITATION_DIFFERENCE = 4, 0.05
+"""Steps of the search for parameters with which a placebo is all but the effect, and their finite difference, in sizes."""
 
 
 @dataclass(frozen=True)
@@ -101,11 +103,12 @@ class Proof:
         Score of each placebo in its place.
     beaten
         Lower end of the 95 % interval of how much better its score is than that of the placebos: the least of the mirrored
-        heading's and the median of the shifted ones'. Infinite where there is no placebo.
+        heading's and the median of the shifted ones'.
     holds
         True where it improves held-out data, and beyond its placebos, none of which comes to `JUDGING.placebo_share`
-        of it; or, of what the hull can imitate only by being off in all its coefficients together, where it improves them
-        over the hull as it is in the model.
+        of it, in circles that on the mirrored heading to as much of what it cannot imitate of a true effect (`imitable`); or,
+        of what the hull can imitate only by being off in all its coefficients together, where it improves them over the hull as
+        it is in the model.
     free_runs
         By adding it to the others.
     """
@@ -220,8 +223,9 @@ def placebos(problem: EstimationProblem, candidate: Candidate, values: Floats) -
     """Return what should explain as much as a candidate if only its shape counted and not when or where it acted.
 
     Its force late by shares of the log, and its force on a vessel that turned the other way (heading mirrored), if it depends
-    on the heading at all. Each has the parameters of the candidate, to be fitted like it; but what is fitted beside an effect
-    and never reported, by how much its formula is off, stays as it was found: a placebo is the same force, elsewhere.
+    on the heading at all. In turning circles a force that comes late is the same force from another side, and no placebo of one
+    that depends on the heading. Each has the parameters of the candidate, to be fitted like it; but what is fitted beside an
+    effect and never reported, by how much its formula is off, stays as it was found: a placebo is the same force, elsewhere.
     """
     unreported = candidate.effect.unreported(problem.plain.measurements, values)
     parameters = tuple(
@@ -240,8 +244,52 @@ def placebos(problem: EstimationProblem, candidate: Candidate, values: Floats) -
     size = np.linalg.norm(as_measured(true) - as_measured(problem.plain))
     # On a heading near north or south the mirrored force is the same: it would test nothing.
     if np.linalg.norm(as_measured(true) - as_measured(wrong)) > JUDGING.placebo_difference * size:
+        shares = dict(zip(list(made), JUDGING.placebo_shifts, strict=True))
+        made = {name: one for name, one in made.items() if not _circles(problem.windows, shares[name])}
         made[HEADING] = mirrored
     return made
+
+
+def _circles(windows: Windows, share: float) -> bool:
+    """Return whether the vessel turns so steadily that its headings, late by a share, are its own but for an angle."""
+    psi = windows.measurements.psi[windows.measurements.usable]
+    apart = np.roll(psi, round(share * len(psi))) - psi
+    around, off = (np.angle(np.exp(1j * one) / np.mean(np.exp(1j * one))) for one in (psi, apart))
+    turns, differs = (float(np.degrees(np.sqrt(np.mean(one**2)))) for one in (around, off))
+    return turns > JUDGING.circling_turn and differs < JUDGING.placebo_turn
+
+
+def imitable(problem: EstimationProblem, candidate: Candidate, placebo: Candidate, values: Floats) -> float:
+    """Return the share of what a candidate does to a log that a placebo can do with parameters of its own, 0 to 1.
+
+    Of the squared whitened prediction errors that the effect changes and the hull cannot imitate within its prior, by
+    Gauss-Newton steps from the candidate's parameters. On a vessel that turns steadily, a current on the mirrored heading gives
+    the same in surge or in sway.
+    """
+    plain = problem.white(problem.plain)
+    N = problem.by_hull
+    inner = N.T @ N + np.eye(N.shape[1])
+
+    def apart(change: Floats) -> Floats:
+        return np.asarray(change - N @ np.linalg.solve(inner, N.T @ change))
+
+    aim = apart(problem.white(candidate.act(problem.plain, values)) - plain)
+    size = float(aim @ aim)
+    limits = np.array([(one.low, one.high, one.size) for one in placebo.parameters])
+    free = [k for k, one in enumerate(placebo.parameters) if one.size > HELD]
+    at, least = values.copy(), 1.0
+
+    def left(p: Floats) -> Floats:
+        return aim - apart(problem.white(placebo.act(problem.plain, p)) - plain)
+
+    for _ in range(IMITATION_STEPS):
+        here = left(at)
+        least = min(least, float(here @ here) / size) if size > 0.0 else 0.0
+        moves = IMITATION_DIFFERENCE * limits[free, 2]
+        slopes = [(left(at + move * np.eye(len(at))[k]) - here) / move for k, move in zip(free, moves, strict=True)]
+        step = np.linalg.lstsq(np.column_stack(slopes), -here, rcond=None)[0]
+        at[free] = np.clip(at[free] + step, limits[free, 0], limits[free, 1])
+    return 1.0 - least
 
 
 def _proof(problem: EstimationProblem, folds: Folds, found: Fit, full: HeldOut, base: HeldOut, index: int) -> Proof:
@@ -252,6 +300,7 @@ def _proof(problem: EstimationProblem, folds: Folds, found: Fit, full: HeldOut, 
     without = held_out(problem, folds, rest, start, found) if rest else base
     made = compare_held_out(problem, folds, without, full)
     in_its_place = placebos(problem, candidate, values)
+    alike = imitable(problem, candidate, in_its_place[HEADING], values) if HEADING in in_its_place else 0.0
 
     def gains_of_placebos(weighed: EstimationProblem, bare: HeldOut, beside: Fit | None = None) -> dict[str, Floats]:
         judged = {
@@ -267,7 +316,7 @@ def _proof(problem: EstimationProblem, folds: Folds, found: Fit, full: HeldOut, 
     holds = made.score_low > 0.0 and beaten > 0.0
     # What acts seldom shows in a block or two, which half of the draws leave out.
     seldom = made.score > JUDGING.gain and made.score > JUDGING.gain + max(scores.values())
-    holds = (holds or seldom) and not _matched(made.score, scores)
+    holds = (holds or seldom) and not _matched(made.score, scores, alike)
     if not holds and _hull_strains(problem, found, rest, start):
         rigid = replace(problem, hull_spread=np.zeros_like(problem.hull_spread))
         stiff = held_out(rigid, folds, rest, start)
@@ -277,19 +326,26 @@ def _proof(problem: EstimationProblem, folds: Folds, found: Fit, full: HeldOut, 
         gains, by_name = _gains(problem, folds, stiff.gaps, own.gaps), gains_of_placebos(rigid, stiff)
         beaten = _beaten(picks, gains, by_name)
         scores = {name: float(one.sum()) for name, one in by_name.items()}
-        holds = made.score_low > 0.0 and beaten > 0.0 and not _matched(made.score, scores)
+        holds = made.score_low > 0.0 and beaten > 0.0 and not _matched(made.score, scores, alike)
     return Proof(candidate, made, scores, beaten, holds, free_runs(problem, folds, without.fits, full.fits))
 
 
-def _matched(score: float, placebos: Mapping[str, float]) -> bool:
+def _matched(score: float, placebos: Mapping[str, float], alike: float) -> bool:
+    """Return whether a placebo comes near.
+
+    Where circles leave that on the mirrored heading alone, it may gain what it can imitate of a true effect.
+    """
     late = sorted(value for name, value in placebos.items() if name != HEADING)
-    return max(late[len(late) // 2], placebos.get(HEADING, -np.inf)) > JUDGING.placebo_share * score
+    share = JUDGING.placebo_share
+    if not late:
+        return placebos[HEADING] > (share + (1.0 - share) * alike) * score
+    return max(late[len(late) // 2], placebos.get(HEADING, -np.inf)) > share * score
 
 
 def _beaten(picks: Floats, gains: Floats, by_name: Mapping[str, Floats]) -> float:
     """Return the lower end of how much more is gained than by the placebos; see `Proof`."""
     late = [one for name, one in by_name.items() if name != HEADING]
-    rivals = [sorted(late, key=lambda one: float(one.sum()))[len(late) // 2]]
+    rivals = [sorted(late, key=lambda one: float(one.sum()))[len(late) // 2]] if late else []
     rivals += [by_name[HEADING]] if HEADING in by_name else []
     return min(float(np.quantile(picks @ (gains - rival), 0.025)) for rival in rivals)
 

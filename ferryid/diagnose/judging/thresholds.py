@@ -159,6 +159,12 @@ class JudgingThresholds:
         "least turn from the vessel's own headings, root mean square, of headings that make a placebo",
         "convention: a wind that points 30 degrees elsewhere is another wind",
     )
+    circling_turn: float = threshold(
+        90.0,
+        "deg",
+        "spread of the headings, root mean square, from which on a vessel that turns steadily turns in circles",
+        "convention: all the way round evenly is 104 degrees",
+    )
     power_in_positions: float = threshold(
         0.5,
         "of what the velocities show",

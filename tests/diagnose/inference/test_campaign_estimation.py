@@ -21,7 +21,7 @@ from ferryid.diagnose.judging.campaign_conditions import ConditionTest, judge_co
 from ferryid.diagnose.judging.campaign_evidence import EXCHANGED, MIRRORED, placebos, without_conditions
 from ferryid.effects import effects
 from ferryid.effects.force_model import ForceModel, hull_of
-from ferryid.types import no_progress
+from ferryid.types import Floats, no_progress
 from ferryid.vessel import load_profile
 from ferryid.vessel.wind import wind_force
 from tests.diagnose.judging.test_held_out import sailed
@@ -197,6 +197,18 @@ def test_like_headings_make_no_placebo() -> None:
     eta[:, 2] = 0.1
     straight = replace(first, windows=replace(first.windows, measurements=replace(first.windows.measurements, eta=eta)))
     assert placebos(replace(made, members=(straight, straight))) == {}
+    # Two circles the same way round: the other's heading is the log's own, but for an angle; one the other way round is not.
+    turning = (0.2 * t for t in (first.windows.measurements.t,) * 2)
+    circles = [_headed(first, psi + at) for psi, at in zip(turning, (0.0, 2.0), strict=True)]
+    assert set(placebos(replace(made, members=tuple(circles)))) == {MIRRORED}
+    other = _headed(first, -0.2 * first.windows.measurements.t)
+    assert set(placebos(replace(made, members=(circles[0], other)))) == {MIRRORED, EXCHANGED}
+
+
+def _headed(member: Member, psi: Floats) -> Member:
+    seen = member.windows.measurements
+    turned = replace(seen, eta=np.column_stack([seen.eta[:, :2], psi]))
+    return replace(member, windows=replace(member.windows, measurements=turned))
 
 
 def test_without_a_placebo_nothing_is_confirmed_and_nothing_estimated() -> None:

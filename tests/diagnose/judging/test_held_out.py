@@ -14,12 +14,14 @@ from ferryid.diagnose.inference.force_errors import force_errors, mass_of
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.free_runs import free_runs
-from ferryid.diagnose.judging.held_out import HEADING, held_out, held_out_evidence, placebos
+from ferryid.diagnose.judging.held_out import HEADING, _matched, held_out, held_out_evidence, imitable, placebos
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
 from ferryid.effects.effect import HELD
 from ferryid.effects.force_model import ForceModel, Measurements, hull_of
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.vessel import load_profile
+from ferryid.vessel.hull import current_in_body
 from ferryid.vessel.profile import Hull
 from ferryid.vessel.wind import wind_force
 from tests.vessel.hull_matrices import forward
@@ -30,10 +32,20 @@ FERRY = load_profile("milliampere")
 WIND = np.array([-2.0, 1.5])
 
 
-def sailed(seconds: float, wind: np.ndarray, noise: float = 0.005, hull: Hull = FERRY.hull) -> Measurements:
-    """Integrate the ferry by scipy under a force of many periods, and measure it with white noise."""
+def sailed(
+    seconds: float,
+    wind: np.ndarray,
+    noise: float = 0.005,
+    hull: Hull = FERRY.hull,
+    *,
+    current: tuple[float, float] = (0.0, 0.0),
+    steady: tuple[float, float, float] | None = None,
+) -> Measurements:
+    """Integrate the ferry by scipy under a force of many periods, or a steady one, and measure it with white noise."""
 
     def tau(t: float) -> np.ndarray:
+        if steady is not None:
+            return np.array(steady)
         # Ratios of periods without a common multiple: the trial never repeats itself.
         return np.array(
             [
@@ -51,7 +63,8 @@ def sailed(seconds: float, wind: np.ndarray, noise: float = 0.005, hull: Hull = 
         load = wind_force(areas, wind[None], psi, nu)
         c, s = np.cos(state[2]), np.sin(state[2])
         moved = [c * state[3] - s * state[4], s * state[3] + c * state[4], state[5]]
-        return np.concatenate([moved, forward(hull, nu, tau(t)[None] + load)[0]])
+        nu_c = current_in_body(np.array([current]), psi) if any(current) else None
+        return np.concatenate([moved, forward(hull, nu, tau(t)[None] + load, nu_c)[0]])
 
     t = np.arange(0.0, seconds, 0.2)
     path = solve_ivp(rates, (0.0, seconds), np.zeros(6), t_eval=t, rtol=1e-8, atol=1e-8).y.T
@@ -236,3 +249,66 @@ def test_free_runs_of_the_true_force_model_stay_with_the_vessel(windy: Estimatio
     assert np.all(better.removed[1:, 0] > 0.5)
     assert np.all(better.low[1:, 0] > 0.0)
     assert np.all(np.diff(better.before[:, 0]) > 0.0)
+
+
+CIRCLING = (150.0, -60.0, 110.0)
+"""A force that never changes [N, N, N·m], under which the ferry turns in circles."""
+SET = (0.2, -0.1)
+"""North and east [m/s]."""
+
+
+@pytest.mark.parametrize(("effect", "current"), [("current", SET), ("wind", (0.0, 0.0)), ("current", (0.0, 0.0))])
+def test_turning_circles_under_constant_orders_show_wind_and_current(effect: str, current: tuple[float, float]) -> None:
+    blows = effect == "wind"
+    problem = trial_on(sailed(400.0, WIND if blows else np.zeros(2), current=current, steady=CIRCLING))
+    found = fit(problem, [candidate(effect)])
+    problem = problem.with_noise_of(found)
+    found = fit(problem, [candidate(effect)])
+    evidence = held_out_evidence(problem, found)
+    assert evidence is not None
+    (proof,) = evidence.proofs
+    assert proof.holds == (blows or any(current))
+    if any(current):
+        assert found.values[0] == pytest.approx(current, abs=0.01)
+        # On the mirrored heading a current does the same in surge or in sway: no less than this is to be expected there.
+        alike = imitable(
+            problem,
+            found.candidates[0],
+            placebos(problem, found.candidates[0], found.values[0])[HEADING],
+            found.values[0],
+        )
+        assert 0.4 < alike < 1.0
+    if blows:
+        assert found.values[0][:2] == pytest.approx(WIND, abs=0.3)
+
+
+def test_what_imitates_an_effect_wholly_or_not_at_all(windy: EstimationProblem) -> None:
+    wind, values = candidate("wind"), np.append(WIND, np.ones(3))
+    assert imitable(windy, wind, wind, values) == pytest.approx(1.0)
+    # Elsewhere in the log the vessel heads elsewhere.
+    assert all(imitable(windy, wind, one, values) < 0.5 for one in placebos(windy, wind, values).values())
+
+
+def test_in_circles_alone_the_mirrored_heading_may_gain_what_it_can_imitate() -> None:
+    late = {"10 s late": 0.0, "20 s late": 0.0, "30 s late": 0.0}
+    share = JUDGING.placebo_share
+    for alike, limit in ((0.0, share), (0.5, 0.5 * (1.0 + share)), (1.0, 1.0)):
+        assert not _matched(100.0, {HEADING: 99.9 * limit}, alike)
+        assert _matched(100.0, {HEADING: 100.1 * limit}, alike)
+        assert _matched(100.0, {**late, HEADING: 100.1 * share}, alike)
+        assert _matched(100.0, dict.fromkeys(late, 100.1 * share), alike)
+
+
+def test_only_in_circles_is_what_comes_late_no_placebo(windy: EstimationProblem) -> None:
+    values = np.append(WIND, np.ones(3))
+    assert len(placebos(windy, candidate("wind"), values)) == 4
+    circles = trial_on(sailed(300.0, WIND, steady=CIRCLING))
+    assert list(placebos(circles, candidate("wind"), values)) == [HEADING]
+    # What does not depend on the heading is not from another side.
+    assert HEADING not in placebos(circles, candidate("thruster_gain", "thruster1"), np.array([0.8]))
+    # A vessel that keeps its heading does not turn, however little that differs from what it was before.
+    eta = circles.windows.measurements.eta.copy()
+    eta[:, 2] = 1.0 + 0.3 * np.sin(circles.windows.measurements.t / 5.0)
+    measurements = replace(circles.windows.measurements, eta=eta)
+    keeping = replace(circles, windows=replace(circles.windows, measurements=measurements))
+    assert len(placebos(keeping, candidate("wind"), values)) == 4
