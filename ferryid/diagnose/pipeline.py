@@ -14,6 +14,8 @@ from ferryid.diagnose.inference.stages import Baseline, estimate, select
 from ferryid.diagnose.judging.campaign import JudgedCampaign, judge_campaign
 from ferryid.diagnose.judging.conclude import conclude
 from ferryid.diagnose.judging.diagnosis import Diagnosis, distinguished
+from ferryid.diagnose.judging.hidden_gain import hidden_gains
+from ferryid.diagnose.judging.hidden_signal import with_gains
 from ferryid.diagnose.judging.judge import judge
 from ferryid.diagnose.judging.learning import Learner, without_withheld
 from ferryid.diagnose.judging.model_update import store_updated_model
@@ -144,7 +146,13 @@ def _diagnosed(
         judged = judge(selected, run.progress)
         made = conclude(group.logs, judged, baseline, together, (*group.notes, *_brought(group, together)))
         sources = compare_second_sources([log.screened.measured for log in group.logs], settings.withhold, run.progress)
-        found += [replace(one, latest=k == len(groups) - 1, sources=sources) for one in made]
+        gains = {}
+        if settings.withhold and together is not None:
+            gains = hidden_gains(together.conditions.tests, together.hull.place, group.logs, settings.model)
+        found += [
+            replace(one, latest=k == len(groups) - 1, sources=sources, withheld=with_gains(one.withheld, gains))
+            for one in made
+        ]
     return tuple(found)
 
 

@@ -12,6 +12,7 @@ from ferryid.diagnose.data.course import MeasuredCourse
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.judging.credibility import HullChange
 from ferryid.diagnose.judging.finding import Finding
+from ferryid.diagnose.judging.hidden_gain import HiddenGain
 from ferryid.diagnose.judging.learning import Learned
 from ferryid.diagnose.judging.likeness import Likeness, likeness_as_json
 from ferryid.diagnose.judging.locate import Location, plain_location
@@ -30,7 +31,8 @@ class Withheld:
 
     `found` and `measured` are by the names of the effect's parameters; `measured` is the mean over the log, of a payload
     over the time that it was aboard, in the unit of `found`. `course` is what was measured of a flow over time, beside the
-    course of the finding; None where that has none.
+    course of the finding; None where that has none. `gain` is how much of what the sensor explains was found, over all logs of
+    a campaign; None of a single log.
     """
 
     signal: str
@@ -38,6 +40,7 @@ class Withheld:
     measured: Mapping[str, float]
     says: str
     course: MeasuredCourse | None = None
+    gain: HiddenGain | None = None
 
     @property
     def off(self) -> tuple[float, float] | None:
@@ -195,6 +198,7 @@ def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
                 "measured": dict(one.measured),
                 "says": one.says,
                 **({} if one.course is None else {"over_time": _over_time(one.course)}),
+                **({} if one.gain is None else {"held_out_gain": one.gain.to_json()}),
             }
             for one in diagnosis.withheld
         ],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.data.payload import aboard
 from ferryid.diagnose.judging.diagnosis import Withheld, flow_off
 from ferryid.diagnose.judging.finding import Finding
+from ferryid.diagnose.judging.hidden_gain import HiddenGain
 from ferryid.effects import effects
 from ferryid.effects.force_model import Measurements
 from ferryid.types import Floats
@@ -31,6 +33,16 @@ def compare_hidden_signals(
         Of the log.
     """
     return tuple(_beside(signal, values, measurements, findings) for signal, values in hidden.items())
+
+
+def with_gains(withheld: Sequence[Withheld], gains: Mapping[str, HiddenGain]) -> tuple[Withheld, ...]:
+    """Return hidden signals with how much of what each explains was found, by signal."""
+    return tuple(
+        replace(one, gain=gains[one.signal], says=f"{one.says} {gains[one.signal].says(one.signal)}")
+        if one.signal in gains
+        else one
+        for one in withheld
+    )
 
 
 def _beside(signal: str, values: Floats, measurements: Measurements, findings: Sequence[Finding]) -> Withheld:
