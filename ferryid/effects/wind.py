@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.effects.effect import Choice, Effect, Parameter, Residual, Turbulence, Values
+from ferryid.effects.effect import Choice, Effect, Parameter, Residual, Turbulence, Values, span
 from ferryid.effects.force_model import ForceModel, Measurements, wind_load
 from ferryid.effects.linear_evidence import hull_jacobian, profiled_loss
 from ferryid.effects.thresholds import EFFECTS
@@ -117,7 +117,7 @@ def says(values: Values, instance: str | None) -> str:
 
 def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     """Return the scenario's wind."""
-    return {"environment": {"wind": {"north_mps": values["north"], "east_mps": values["east"]}}}
+    return {"environment": {"wind": {"north_mps": values["north"], "east_mps": values["east"], **span(values)}}}
 
 
 def regressor(force_model: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
@@ -134,6 +134,7 @@ EFFECT = Effect(
     scenario,
     cannot=cannot,
     choose=choose,
+    onset=True,
     unreported=unreported,
     regressor=regressor,
     formula_error=EFFECTS.load_error,

@@ -47,6 +47,7 @@ def wind_series(scenario: Scenario, seed: int, n: int, step_s: float) -> tuple[F
     )
     blown = interpolated(t, np.arange(nodes, dtype=np.float64) * GUST_STEP_S, swing)
     blown += np.array((wind.north_mps, wind.east_mps))
+    blown[(t < wind.from_s) | (t >= wind.until_s)] = 0.0
     if wind.series:
         grid, *recorded = read_series(scenario.file(wind.series))
         blown += interpolated(t, grid, np.column_stack(recorded))

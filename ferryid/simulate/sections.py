@@ -52,7 +52,7 @@ class Wind:
     """``[environment.wind]``: wind over ground, where the air goes to, with Ornstein-Uhlenbeck gusts on both components.
 
     `series` names a CSV file beside the scenario, with a header and the columns time [s], north, east [m/s]; it is added to
-    the steady wind and held beyond its ends.
+    the steady wind and held beyond its ends. Steady wind and gusts blow from `from_s` until `until_s`; the air is still else.
     """
 
     north_mps: float = signed(0.0, 60.0)
@@ -60,6 +60,8 @@ class Wind:
     gust_std_mps: float = limited(0.0, 0.0, 60.0)
     gust_time_s: float = positive(8.0)
     series: str = chosen("")
+    from_s: float = limited(0.0)
+    until_s: float = limited(ALWAYS_S)
 
 
 @dataclass(frozen=True)

@@ -351,6 +351,15 @@ def test_a_recorded_wind_is_added_and_held(tmp_path):
     np.testing.assert_allclose(east, [5, 5, 5, 2.5, 0, -2.5, -5, -5, -5], atol=1e-12)
 
 
+def test_a_wind_gets_up_and_drops():
+    asked = replace(scenario(), wind=Wind(north_mps=-3.0, gust_std_mps=0.5, from_s=1.0, until_s=3.0))
+    north, east = wind_series(asked, 1, 9, 0.5)
+    still = np.array([True, True, False, False, False, False, True, True, True])
+    assert ((north == 0.0) & (east == 0.0)).tolist() == still.tolist()
+    always = wind_series(replace(asked, wind=replace(asked.wind, from_s=0.0, until_s=1e6)), 1, 9, 0.5)
+    np.testing.assert_array_equal(north[~still], always[0][~still])
+
+
 def test_headings_are_wrapped_before_they_are_halved():
     """A heading of one turn more is the same quaternion, not its negative."""
     asked = scenario()

@@ -156,3 +156,15 @@ def test_a_fault_that_passes_is_found_with_both_its_ends(tmp_path: Path) -> None
     (one,) = found.candidates
     assert (one.onset_s, one.offset_s) == (pytest.approx(260.0, abs=5.0), pytest.approx(400.0, abs=5.0))
     assert found.values[0] == pytest.approx([0.55], abs=0.03)
+
+
+@pytest.mark.slow
+def test_a_wind_that_gets_up_is_found_with_its_beginning(tmp_path: Path) -> None:
+    wind = "[environment.wind]\nnorth_mps = -3.0\neast_mps = 4.0\nfrom_s = 300\n"
+    case = trial_on(sailed(tmp_path, "gets up", TWELVE + wind, 5))
+    known = [one for one in list_candidates(case.plain.measurements)[0] if one.effect.onset]
+    found = search(case, lambda stage: None, known=known).fit
+    assert [one.key for one in found.candidates] == [("wind", None)]
+    (one,) = found.candidates
+    assert (one.onset_s, one.offset_s) == (pytest.approx(300.0, abs=5.0), inf)
+    assert found.values[0][:2] == pytest.approx([-3.0, 4.0], abs=0.4)
