@@ -18,7 +18,7 @@ from ferryid.vessel.profile import Profile
 
 def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     """Return the factor on the force astern; ahead the thrust curve holds."""
-    return (Parameter("factor", "-", 0.3, 0.0, 3.0, neutral=1.0),)
+    return (Parameter("factor", "-", 0.3, 0.0, 3.0, neutral=1.0, attainable=frozenset({0.0})),)
 
 
 def instances(profile: Profile) -> tuple[str | None, ...]:

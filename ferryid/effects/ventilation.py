@@ -41,7 +41,7 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     """Return the share of the force that a ventilated propeller keeps, and the loading from which on it draws air."""
     return (
         # Without a loss the loading has no meaning.
-        Parameter("factor", "-", 0.3, 0.0, 1.0, neutral=1.0, start=0.8),
+        Parameter("factor", "-", 0.3, 0.0, 1.0, neutral=1.0, start=0.8, attainable=frozenset({0.0})),
         Parameter("from", "%", 15.0, 30.0, 90.0, neutral=60.0),
     )
 

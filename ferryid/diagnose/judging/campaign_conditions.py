@@ -318,7 +318,7 @@ def _finding(test: ConditionTest, i: int, tests: tuple[ConditionTest, ...]) -> F
             Rival(one.effect, None, one.evidence - test.evidence) for one in tests if one.effect != test.effect
         ),
         unresolved_with=test.unresolved,
-        separating_manoeuvre=manoeuvre(test.effect, test.unresolved, windows.measurements.profile.setting),
+        separating_manoeuvre=manoeuvre(test.effect, test.unresolved, errors.windows.measurements.profile.setting),
         says=says,
         course=test.courses[i] if test.courses else None,
         **_figure(test, i, errors, shares, value),
