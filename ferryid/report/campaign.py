@@ -162,7 +162,8 @@ def text_tables(diagnoses: Sequence[Diagnosis]) -> list[str]:
     if rows := effect_rows(diagnoses):
         every = [[row["name"], row["logs"], row["size"]] for row in rows]
         blocks.append(_aligned([["left out of the model", "logs", "size over those logs"], *every]))
-    verdicts = [[_short(one.log), one.verdict.replace("_", " "), names_of(one)] for one in diagnoses]
+    common = diagnosis_words.findings_of_all(diagnoses)
+    verdicts = [[_short(one.log), one.verdict.replace("_", " "), names_of(one, common)] for one in diagnoses]
     blocks.append(_aligned([["log", "verdict", "left out of the model"], *verdicts]))
     for effect in FLOWS:
         flows = flow_rows(diagnoses, effect)
@@ -200,10 +201,11 @@ def left_to_the_page(diagnoses: Sequence[Diagnosis], told: Sequence[str]) -> str
     return f"Every log by itself is in the report{about}."
 
 
-def names_of(diagnosis: Diagnosis) -> str:
-    """Return the effects of a log in words, hints apart."""
-    sure = [_inline(one) for one in diagnosis.findings if one.sure]
-    hints = [_inline(one) for one in diagnosis.findings if not one.sure]
+def names_of(diagnosis: Diagnosis, common: Sequence[Finding] = ()) -> str:
+    """Return the effects of a log in words, hints apart, without those of all logs."""
+    own = diagnosis_words.findings_of(diagnosis, common)
+    sure = [_inline(one) for one in own if one.sure]
+    hints = [_inline(one) for one in own if not one.sure]
     parts = [", ".join(sure)] if sure else []
     parts += [f"perhaps {', '.join(hints)}"] if hints else []
     return "; ".join(parts) or "–"

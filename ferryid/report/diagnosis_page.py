@@ -181,7 +181,7 @@ def _log(
             for k, one in enumerate(diagnosis_words.findings_of(diagnosis, common), 1)
         ],
         "left_out": left_out_table(diagnosis.left_out),
-        "names": campaign.names_of(diagnosis),
+        "names": campaign.names_of(diagnosis, common),
         "force_rows": force_rows,
         "free_run_rows": free_run_rows,
         "free_run_figures": _free_run_figures(diagnosis, prefix) if drawn else [],

@@ -118,6 +118,13 @@ def test_a_terminal_shows_tables_within_its_width_and_leaves_each_log_to_the_pag
     assert "\N{NO-BREAK SPACE}" not in text
 
 
+def test_what_all_logs_have_is_no_name_of_each() -> None:
+    every = [log(name, gain(), *one) for name, one in (("a", [flow(1.0, 0.0)]), ("b", []))]
+    common = (every[0].findings[0],)
+    assert [campaign.names_of(one, common) for one in every] == ["steady wind", "–"]
+    assert campaign.names_of(every[1]) == "thruster force (thruster1)"
+
+
 def test_a_log_that_could_not_be_used_has_its_reason_on_the_terminal() -> None:
     copy = replace(log("copy"), verdict="not_testable", notes=("It is the same recording.",))
     text = as_text([*three(), copy])
