@@ -74,7 +74,7 @@ def flow_rows(diagnoses: Sequence[Diagnosis], effect: str) -> list[dict[str, str
 
 
 def withheld_summary(diagnoses: Sequence[Diagnosis], effect: str) -> str:
-    """Return how the withheld measurements of several logs compare with what was found, in one sentence; empty without any."""
+    """Return how the withheld measurements of several logs compare with what was found, in sentences; empty without any."""
     hidden = [one for one in (_withheld(each, effect) for each in diagnoses) if one is not None]
     if not hidden:
         return ""
@@ -92,7 +92,8 @@ def withheld_summary(diagnoses: Sequence[Diagnosis], effect: str) -> str:
     courses = [one.course.correlation for one in found if one.course and isfinite(one.course.correlation)]
     if courses:
         parts.append(f"over time, estimate and measurement correlate by {np.median(courses):.2f} in the median")
-    return f"{told}: {'; '.join(parts)}."
+    gains = [one.gain.says(effect) for one in hidden if one.gain is not None]
+    return " ".join([f"{told}: {'; '.join(parts)}.", *gains[:1]])
 
 
 def error_sentence(diagnoses: Sequence[Diagnosis]) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose import Diagnosis, Estimate, Finding, Withheld
+from ferryid.diagnose.judging.hidden_gain import HiddenGain
 from ferryid.report import campaign
 from ferryid.report.diagnosis_page import as_text, render
 from tests.report.test_diagnosis import diagnosis, gain, wind
@@ -76,6 +77,9 @@ def test_what_was_withheld_is_summed_up() -> None:
     # Angles of 0, 45 and 0 degrees; strengths of 1/2, 1/√2 and 1; of the six components three lie within half a metre.
     assert "0 deg off; at 0.71 of its strength" in said
     assert "hold 4 of 6 components" in said
+    gain = HiddenGain.of(np.full(20, 1.0), np.full(20, 4.0), 3)
+    shown = [replace(one, withheld=tuple(replace(each, gain=gain) for each in one.withheld)) for one in three()]
+    assert campaign.withheld_summary(shown, "wind").count("25 % of it") == 1
     none = [log("a", withheld=hidden(None, 1.0, 0.0))]
     assert campaign.withheld_summary(none, "wind").endswith("withheld from 1 log, and it was found in 0.")
     assert campaign.flow_rows(none, "wind")[0]["off"] == "–"
