@@ -232,23 +232,17 @@ class _Problem:
         motion = np.array([not term.endswith("_dot") and "_r" not in term for term in functions.terms])
         phi = np.where(motion, phi, 0.0)
         base = motion_force(self.profile, self.scale, still, points, across[:, 0])
-        G = self.G(flat)
-        rows = []
-        for nu, values, force in zip(points, phi, base, strict=True):
-            power = np.linalg.solve(G.T, nu)
-            slope = np.array(
-                [power[axis] * values[k] if k not in self.acceleration.values() else 0.0 for k, axis in self.places]
-            )
-            if np.any(slope):
-                which = "surge" if nu[0] else "sway and yaw"
-                rows.append(
-                    (
-                        slope,
-                        -float(nu @ force),
-                        f"The data want damping in {which} that feeds the motion: it is held at none.",
-                    )
-                )
-        return rows
+        power = np.linalg.solve(self.G(flat).T, points.T).T
+        terms, axes = (np.array(part) for part in zip(*self.places, strict=True))
+        slopes = power[:, axes] * phi[:, terms]
+        slopes[:, np.isin(terms, list(self.acceleration.values()))] = 0.0
+        levels = (-np.einsum("pi,pi->p", points, base)).tolist()
+        told = "The data want damping in {} that feeds the motion: it is held at none."
+        surge, others = (told.format(which) for which in ("surge", "sway and yaw"))
+        return [
+            (slopes[k], levels[k], surge if points[k, 0] else others)
+            for k in np.flatnonzero(slopes.any(axis=1)).tolist()
+        ]
 
     def projection(self, rows: list[tuple[Floats, float, str]]) -> tuple[Floats, Floats, Floats]:
         """Return what leads other gains to where these rows hold exactly; see `Feasible`."""

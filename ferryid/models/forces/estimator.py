@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from ferryid.effects.force_model import COEFFICIENTS, hull_of
 from ferryid.errors import FerryIdError
 from ferryid.models.forces.hull_terms import hull_contribution
-from ferryid.models.forces.residual import base_force, motion_force, scale_hull
+from ferryid.models.forces.residual import base_force, hull_force, scale_hull
 from ferryid.models.model import NO_BASIS, Model
 from ferryid.regression.bases import Basis, make_basis, relative_flow
 from ferryid.signals.track import Motion
@@ -42,6 +43,11 @@ class Estimator:
     theta: Floats | None = None
     intercept: Floats | None = None
 
+    @cached_property
+    def _scaled(self) -> tuple[Hull, float]:
+        """The hull with its factors, and that of the force: a free run asks for them a thousand times."""
+        return scale_hull(self.profile.hull, self.scale), float(self.scale.get("zeta", 1.0))
+
     def of(self, motion: Motion) -> Floats:
         """Return the estimated applied force on every row of a motion [N, N, N·m], shape (n, 3)."""
         tau = base_force(self.profile, motion, self.scale)
@@ -69,7 +75,8 @@ class Estimator:
         payload: Floats | None = None,
     ) -> Floats:
         """Return the force for given states, all with s rows; a `ForceLaw`."""
-        tau = motion_force(self.profile, self.scale, nu_dot, nu, psi, wind=wind, current=current, payload=payload)
+        hull, zeta = self._scaled
+        tau = hull_force(hull, self.profile.wind, zeta, nu_dot, nu, psi, wind=wind, current=current, payload=payload)
         if self.basis is None or self.theta is None or self.intercept is None:
             return tau
         wind_rel = None if wind is None else relative_flow(nu, psi, wind)

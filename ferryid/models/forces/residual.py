@@ -11,7 +11,7 @@ from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.signals.track import Motion
 from ferryid.types import Floats
 from ferryid.vessel.hull import current_in_body, inverse_dynamics, payload_force, payload_mass
-from ferryid.vessel.profile import Hull, Profile
+from ferryid.vessel.profile import Hull, Profile, WindAreas
 from ferryid.vessel.wind import wind_force
 
 FORMS = ("measured", "commanded", "parallel")
@@ -86,13 +86,53 @@ def motion_force(
     ndarray
         Surge and sway force [N] and yaw moment [N·m], shape (n, 3); NaN where an input is.
     """
+    zeta = float(scale.get("zeta", 1.0))
+    return hull_force(
+        scale_hull(profile.hull, scale),
+        profile.wind,
+        zeta,
+        nu_dot,
+        nu,
+        psi,
+        wind=wind,
+        current=current,
+        payload=payload,
+    )
+
+
+def hull_force(
+    hull: Hull,
+    areas: WindAreas | None,
+    zeta: float,
+    nu_dot: Floats,
+    nu: Floats,
+    psi: Floats,
+    *,
+    wind: Floats | None = None,
+    current: Floats | None = None,
+    payload: Floats | None = None,
+) -> Floats:
+    """Return what `motion_force` does, of a hull that has its factors on it, for many calls with the same one.
+
+    Parameters
+    ----------
+    hull, areas, zeta
+        Hull from `scale_hull`, wind areas of the profile or None, and the factor on the measured force.
+    nu_dot, nu, psi, wind, current, payload
+        As in `motion_force`.
+
+    Returns
+    -------
+    ndarray
+        Surge and sway force [N] and yaw moment [N·m], shape (n, 3); NaN where an input is.
+    """
     nu_c = None if current is None else current_in_body(current, psi)
-    tau = inverse_dynamics(scale_hull(profile.hull, scale), nu_dot, nu, nu_c)
-    if wind is not None and profile.wind is not None:
-        tau = tau - wind_force(profile.wind, wind, psi, nu)
+    tau = inverse_dynamics(hull, nu_dot, nu, nu_c)
+    if wind is not None and areas is not None:
+        tau = tau - wind_force(areas, wind, psi, nu)
     if payload is not None:
         tau = tau + payload_force(payload, nu_dot, nu)
-    return tau / float(scale.get("zeta", 1.0))
+    return tau / zeta
 
 
 def scale_hull(hull: Hull, scale: Mapping[str, float]) -> Hull:

@@ -265,34 +265,49 @@ def _integrate(force: ForceLaw, motion: Motion, starts: Ints, horizon_s: float) 
     path = np.empty((len(starts), steps + 1, 6))
     path[:, 0] = state
 
-    def derivative(at: Floats, rows: Ints, following: Ints, part: float) -> Floats:
+    def derivative(at: Floats, inputs: _Inputs, inverse: Floats) -> Floats:
         psi, nu = at[:, 2], at[:, 3:]
-        tau = _between(motion.tau, rows, following, part)
-        wind = None if motion.wind is None else _between(motion.wind, rows, following, part)
-        current = None if motion.current is None else _between(motion.current, rows, following, part)
-        # Held over the step, as it was measured: half a passenger never came aboard.
-        payload = () if motion.payload is None else (motion.payload[rows],)
-        rest = force(np.zeros_like(nu), nu, psi, wind, current, *payload)
-        inverse = inverses[rows] if payload else inverses[0]
-        nu_dot = np.einsum("nij,nj->ni", inverse, tau - rest) if payload else (tau - rest) @ inverse.T
+        tau, wind, current, payload = inputs
+        rest = force(no_acceleration, nu, psi, wind, current, *payload)
+        out = np.empty_like(at)
         c, s = np.cos(psi), np.sin(psi)
-        eta_dot = np.column_stack([c * nu[:, 0] - s * nu[:, 1], s * nu[:, 0] + c * nu[:, 1], nu[:, 2]])
-        return np.hstack([eta_dot, nu_dot])
+        out[:, 0] = c * nu[:, 0] - s * nu[:, 1]
+        out[:, 1] = s * nu[:, 0] + c * nu[:, 1]
+        out[:, 2] = nu[:, 2]
+        out[:, 3:] = np.einsum("nij,nj->ni", inverse, tau - rest) if payload else (tau - rest) @ inverse.T
+        return out
 
+    no_acceleration = np.zeros((len(starts), 3))
     with np.errstate(over="ignore", invalid="ignore"):
         for k in range(steps):
             rows = np.minimum(starts + k * stride, last)
             following = np.minimum(rows + stride, last)
+            inverse = inverses[rows] if motion.payload is not None else inverses[0]
             for i in range(substeps):
                 a, b = i / substeps, (i + 1) / substeps
-                k1 = derivative(state, rows, following, a)
-                k2 = derivative(state + dt / 2 * k1, rows, following, (a + b) / 2)
-                k3 = derivative(state + dt / 2 * k2, rows, following, (a + b) / 2)
-                k4 = derivative(state + dt * k3, rows, following, b)
+                at_a, halfway, at_b = (_inputs(motion, rows, following, part) for part in (a, (a + b) / 2, b))
+                k1 = derivative(state, at_a, inverse)
+                k2 = derivative(state + dt / 2 * k1, halfway, inverse)
+                k3 = derivative(state + dt / 2 * k2, halfway, inverse)
+                k4 = derivative(state + dt * k3, at_b, inverse)
                 state = state + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
             state[np.any(np.abs(state[:, 3:]) > limit, axis=1)] = np.nan
             path[:, k + 1] = state
     return path, stride
+
+
+_Inputs = tuple[Floats, Floats | None, Floats | None, tuple[Floats, ...]]
+"""What acts from outside in the rows of a step: actuator force, wind, current, payload."""
+
+
+def _inputs(motion: Motion, rows: Ints, following: Ints, part: float) -> _Inputs:
+    return (
+        _between(motion.tau, rows, following, part),
+        None if motion.wind is None else _between(motion.wind, rows, following, part),
+        None if motion.current is None else _between(motion.current, rows, following, part),
+        # Held over the step, as it was measured: half a passenger never came aboard.
+        () if motion.payload is None else (motion.payload[rows],),
+    )
 
 
 def _between(values: Floats, rows: Ints, following: Ints, part: float) -> Floats:

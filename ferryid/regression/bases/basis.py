@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import isfinite, nan
 
 import numpy as np
@@ -100,12 +101,12 @@ class Basis:
         """Units of the coefficients in surge, sway and yaw, K rows of three."""
         return tuple(coefficient_units(term) for term in self.functions)
 
-    @property
+    @cached_property
     def needs_wind(self) -> bool:
         """True where a function depends on the apparent wind."""
         return self._needs("rw")
 
-    @property
+    @cached_property
     def needs_current(self) -> bool:
         """True where a function depends on the velocity through the water."""
         return self._needs("rc")
@@ -152,8 +153,11 @@ class Basis:
         values = _factors(nu, nu_dot)
         if isfinite(self.length_m):
             values.update(crossflow_integrals(values["v"], values["r"], self.length_m))
-        for flow, relative, what in (("rw", wind_rel, "wind"), ("rc", current_rel, "current")):
-            if self._needs(flow):
+        for flow, relative, what, needed in (
+            ("rw", wind_rel, "wind", self.needs_wind),
+            ("rc", current_rel, "current", self.needs_current),
+        ):
+            if needed:
                 if relative is None:
                     raise FerryIdError(
                         f'basis "{self.name}": needs {what}, and there is none for these rows. '
