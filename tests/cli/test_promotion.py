@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -12,21 +13,29 @@ from ferryid.compare.comparison_result import Ratio
 from ferryid.compare.replay import ReplayRow
 from ferryid.models.store import load
 from ferryid.report import promotion
+from tests.cli.conftest import invoke
 from tests.cli.test_every_command import SCALE, THESIS, conforms
 
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture
-def store(ferryid, fixtures: Path, tmp_path: Path) -> Path:
+@pytest.fixture(scope="module")
+def fitted(fixtures: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A store with two versions: the second is current."""
+    folder = tmp_path_factory.mktemp("store")
     for components in ("8", "4"):
-        run = ferryid(
+        run = invoke(
             "fit", fixtures / "short.mcap", "--vessel", "milliampere", *SCALE, *THESIS, "--components", components,
-            "--out", tmp_path,
+            "--out", folder,
         )  # fmt: skip
         assert run.code == 0
-    return tmp_path
+    return folder
+
+
+@pytest.fixture
+def store(fitted: Path, tmp_path: Path) -> Path:
+    """The store of two versions, to be changed."""
+    return shutil.copytree(fitted, tmp_path / "store")
 
 
 def current(store: Path) -> str:
