@@ -22,6 +22,7 @@ from ferryid.batch import kept, steps, task
 from ferryid.batch import run as running
 from ferryid.batch.log_result import LogFile, StepSummary
 from ferryid.batch.remaining import Remaining, told_time
+from ferryid.batch.spread import spread
 from ferryid.errors import FerryIdError, UnwritableError
 from ferryid.files import dump_json, unwritable
 from ferryid.report.batch_rows import BatchResult
@@ -41,6 +42,13 @@ def results(folder: Path) -> Path:
     return folder / "out" / "batch" / "results"
 
 
+@pytest.fixture
+def here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Work in this process: for what becomes of rows and results, whichever process makes them."""
+    monkeypatch.setattr(running, "spread", lambda processes, dask, *, apart: spread())
+
+
+@pytest.mark.usefixtures("here")
 def test_a_bad_log_is_a_row_and_the_rest_goes_on(tmp_path: Path) -> None:
     logs = archive(tmp_path, 2)
     recipe(tmp_path)
@@ -99,6 +107,7 @@ def test_every_step_of_one_log(tmp_path: Path) -> None:
     assert list((tmp_path / "out" / "logs").glob("day0-*/*.parquet"))
 
 
+@pytest.mark.usefixtures("here")
 def test_what_one_step_refuses_another_may_take(tmp_path: Path) -> None:
     logs = tmp_path / "season"
     logs.mkdir()
@@ -114,6 +123,7 @@ def test_what_one_step_refuses_another_may_take(tmp_path: Path) -> None:
     assert told == [f"partly: {logs / 'brief'}: {row.reason}"]
 
 
+@pytest.mark.usefixtures("here")
 def test_another_recipe_profile_or_model_is_another_result(tmp_path: Path) -> None:
     logs = archive(tmp_path, 2)
     recipe(tmp_path, FIT)
@@ -147,6 +157,7 @@ def test_another_recipe_profile_or_model_is_another_result(tmp_path: Path) -> No
     assert changed.counts["done_before"] == 0
 
 
+@pytest.mark.usefixtures("here")
 def test_a_log_is_known_by_its_content_where_it_was_touched_or_moved(tmp_path: Path) -> None:
     logs = archive(tmp_path, 2)
     (logs / "day1.mcap").write_bytes((Path(__file__).resolve().parents[2] / "fixtures" / "truncated.mcap").read_bytes())
@@ -315,6 +326,7 @@ def wait_for(folder: Path, count: int, working: subprocess.Popen[str]) -> None:
         time.sleep(0.002)
 
 
+@pytest.mark.usefixtures("here")
 def test_killed_in_the_middle_it_repeats_nothing_and_loses_nothing(tmp_path: Path) -> None:
     logs = archive(tmp_path, 6)
     recipe(tmp_path, FIT)
@@ -329,7 +341,7 @@ def test_killed_in_the_middle_it_repeats_nothing_and_loses_nothing(tmp_path: Pat
     abandoned = tmp_path / "out" / "logs" / f".day5.{0:032x}.part"
     abandoned.mkdir()
 
-    second, told = run(tmp_path, logs / "*.mcap", processes=2)
+    second, told = run(tmp_path, logs / "*.mcap")
     assert told == [f"{len(before)} of 6 logs done already; {6 - len(before)} left"]
     assert before.items() <= rows_of(tmp_path).items(), "what was done is not done again"
     assert set(statuses(second).values()) == {"done"}
@@ -338,7 +350,7 @@ def test_killed_in_the_middle_it_repeats_nothing_and_loses_nothing(tmp_path: Pat
 
     # As a run that nobody killed.
     shutil.move(tmp_path / "out", tmp_path / "killed")
-    whole, _ = run(tmp_path, logs / "*.mcap", processes=2)
+    whole, _ = run(tmp_path, logs / "*.mcap")
     assert same(whole) == same(second)
     tables = [pq.read_table(tmp_path / place / "batch" / "summary.parquet") for place in ("killed", "out")]
     mine, other = (table.drop_columns(["seconds", "peak_bytes"]) for table in tables)

@@ -21,11 +21,15 @@ from ferryid.batch.spread import spread
 from ferryid.errors import FerryIdError
 from ferryid.files import unwritable
 from ferryid.validation import run as running
+from ferryid.validation import stages
 from ferryid.validation.checkpoint import completed, run_stage
 from ferryid.validation.commitment import verified_answers
 from ferryid.validation.interfaces import Evaluator
+from ferryid.validation.records import Diagnosis
 from ferryid.validation.run import render_summary, run_validation
+from ferryid.validation.source_hash import source_hash
 from ferryid.validation.stages import LogJob, diagnose_case
+from ferryid.validation.worker import diagnose_log
 from tests.batch.work import children_of, ended, environment
 from tests.validation.stand_ins import PIPELINE, TALLY, OracleMade, chatty, counted
 
@@ -37,6 +41,21 @@ def tally(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Count what is done."""
     (tmp_path / "tally").touch()
     monkeypatch.setenv(TALLY, str(tmp_path / "tally"))
+
+
+class Here:
+    """Diagnoses as a worker does, in this process: for what a run does with diagnoses, wherever they are made."""
+
+    sources = source_hash()
+
+    def diagnose(self, log: Path, profile: Path, out: Path) -> Diagnosis:
+        return diagnose_log(log, profile, out)
+
+
+@pytest.fixture
+def here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Start no process to diagnose."""
+    monkeypatch.setattr(stages, "worker_of", lambda folder: Here())
 
 
 def validated(out: Path, pipeline: Any = PIPELINE, **options: Any) -> tuple[dict[str, Any], list[str]]:
@@ -143,6 +162,7 @@ def test_a_worker_of_other_sources_is_an_error(tmp_path: Path) -> None:
         diagnose_case(LogJob(tmp_path, "older", "b", "b.mcap", "vessel.toml"))
 
 
+@pytest.mark.usefixtures("here")
 def test_a_fresh_seed_each_time(tmp_path: Path) -> None:
     seeds = [validated(tmp_path / name, seed=None, runs=0)[0]["seed"] for name in ("a", "b")]
     assert seeds[0] != seeds[1]
@@ -167,6 +187,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.usefixtures("here")
 @pytest.mark.parametrize(
     ("stage", "title"), [("written", "writing logs"), ("diagnosed", "diagnosing"), ("transfer", "transfer")]
 )
@@ -192,7 +213,7 @@ def test_killed_in_the_middle_it_repeats_nothing_and_loses_nothing(tmp_path: Pat
     with path.open("ab") as file:
         file.write(b'{"name": "0007", "resu')
 
-    result, announced = validated(out, runs=8, processes=2)
+    result, announced = validated(out, runs=8)
     assert "completed cases of this folder's run are kept" in announced
     assert result["counts"]["diagnosed"] == 8
     for one, data in before.items():
@@ -231,6 +252,7 @@ def test_other_sources_or_another_seed_begin_from_the_start(tmp_path: Path, monk
     assert (out / "proof" / "mine.txt").exists()
 
 
+@pytest.mark.usefixtures("here")
 def test_a_draw_that_cannot_be_leaves_no_trace_and_a_command_can_be_pasted(tmp_path: Path) -> None:
     def refused(seed: int, runs: float, only: Any) -> Any:
         raise FerryIdError("no such cell. Fix: another")
@@ -258,6 +280,7 @@ def test_other_files_are_left_alone(tmp_path: Path, run: str | None) -> None:
     assert counted() == []
 
 
+@pytest.mark.usefixtures("here")
 @pytest.mark.parametrize(
     ("stage", "result"),
     [("diagnosed", None), ("diagnosed", {}), ("written", None), ("written", 1), ("written", "xyz"), ("oracle", 1)],
@@ -271,6 +294,7 @@ def test_lines_that_ferryid_has_not_written(tmp_path: Path, stage: str, result: 
         validated(out, runs=2)
 
 
+@pytest.mark.usefixtures("here")
 def test_a_full_disk_is_no_result(tmp_path: Path) -> None:
     def full(trial: Any) -> Any:
         (trial.folder / "half").mkdir(parents=True)
@@ -286,6 +310,7 @@ def test_a_full_disk_is_no_result(tmp_path: Path) -> None:
     assert [one["oracle"]["log"] for one in result["scores"]["of"]] == [True, True]
 
 
+@pytest.mark.usefixtures("here")
 def test_an_unfinished_run_is_not_thrown_away(tmp_path: Path) -> None:
     out = tmp_path / "out"
     validated(out)
@@ -299,6 +324,7 @@ def test_an_unfinished_run_is_not_thrown_away(tmp_path: Path) -> None:
     assert len(counted()) == count, "with its own seed it goes on where it was"
 
 
+@pytest.mark.usefixtures("here")
 def test_other_evaluators_run_again_without_another_diagnosis(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out = tmp_path / "out"
     validated(out)
@@ -311,6 +337,7 @@ def test_other_evaluators_run_again_without_another_diagnosis(tmp_path: Path, mo
     assert (out / "proof" / "lines" / "diagnosed.jsonl").read_bytes() == kept
 
 
+@pytest.mark.usefixtures("here")
 def test_another_draw_than_the_committed_one_is_refused(tmp_path: Path) -> None:
     validated(tmp_path / "out", runs=2)
     other = replace(PIPELINE, draw=lambda seed, runs, only: PIPELINE.draw(seed + 1, runs, only))
@@ -318,6 +345,7 @@ def test_another_draw_than_the_committed_one_is_refused(tmp_path: Path) -> None:
         validated(tmp_path / "out", other, runs=2)
 
 
+@pytest.mark.usefixtures("here")
 def test_a_changed_or_missing_commitment_is_refused(tmp_path: Path) -> None:
     out = tmp_path / "out"
     validated(out, runs=2)
@@ -347,6 +375,7 @@ def test_a_folder_of_an_earlier_version_is_refused_in_one_line(tmp_path: Path) -
     assert counted() == []
 
 
+@pytest.mark.usefixtures("here")
 def test_a_log_that_somebody_removed_is_written_again(tmp_path: Path) -> None:
     out = tmp_path / "out"
     first, _ = validated(out, runs=3)
@@ -364,6 +393,7 @@ def test_beside_a_log_lies_nothing_but_its_profile(tmp_path: Path) -> None:
     assert not list((tmp_path / "out" / "proof" / "logs").iterdir())
 
 
+@pytest.mark.usefixtures("here")
 def test_two_at_once_do_not_share_a_folder(tmp_path: Path) -> None:
     refused = []
 
