@@ -132,7 +132,7 @@ def run_free(
         starts, ends = starting_points(motion, allowed, float(horizons[0]), float(horizons[-1]))
         if starts.size == 0:
             continue
-        path, stride = _integrate(force, motion, starts, float(horizons[-1]))
+        path, stride = _integrate(force, motion, starts, ends, float(horizons[-1]))
         error = _errors(path, stride, motion, starts, ends, horizons)
         reached = _rows_at(starts, stride, motion.rate_hz, horizons) < ends[:, None]
         diverged += int(np.any(reached & np.isnan(error[:, :, 2]), axis=1).sum())
@@ -175,7 +175,7 @@ def single_runs(force: ForceLaw, motion: Motion, starts: Ints, ends: Ints, horiz
     not reach the horizon within its stretch. Parameters as of `run_free`, and starts and ends as of `starting_points`.
     """
     horizons = np.asarray(horizons_s, dtype=float)
-    path, stride = _integrate(force, motion, starts, float(horizons[-1]))
+    path, stride = _integrate(force, motion, starts, ends, float(horizons[-1]))
     return _errors(path, stride, motion, starts, ends, horizons)
 
 
@@ -247,12 +247,16 @@ def _jumps(motion: Motion) -> Flags:
     return leaps
 
 
-def _integrate(force: ForceLaw, motion: Motion, starts: Ints, horizon_s: float) -> tuple[Floats, int]:
-    """Return states (starts, steps + 1, 6) of position, heading, velocity, and the rows per step."""
+def _integrate(force: ForceLaw, motion: Motion, starts: Ints, ends: Ints, horizon_s: float) -> tuple[Floats, int]:
+    """Return states (starts, steps + 1, 6) of position, heading, velocity, and the rows per step.
+
+    As far as the longest stretch goes, where that is shorter than the horizon.
+    """
     stride = max(1, int(STEP_S * motion.rate_hz))
     substeps = max(1, int(np.ceil(1.0 / (STEP_S * motion.rate_hz))))
     dt = stride / motion.rate_hz / substeps
-    steps = int(np.ceil(horizon_s * motion.rate_hz / stride))
+    farthest = min(horizon_s * motion.rate_hz, float(np.max(ends - starts, initial=0)))
+    steps = int(np.ceil(farthest / stride))
     last = len(motion.t) - 1
     masses = _masses(force, motion)
     inverses = np.linalg.inv(np.where(np.isfinite(masses), masses, np.eye(3)))
