@@ -89,6 +89,7 @@ def test_a_profile_is_what_a_tank_and_a_drawing_give(vessel, tmp_path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.xdist_group("validation plant")  # whose first trial compiles: no second worker has to wait for it
 @pytest.mark.parametrize("format", FORMATS)
 def test_a_case_is_written_the_same_each_time_and_its_transfer_log_is_another(format, tmp_path) -> None:
     from dataclasses import replace

@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from tests.cli.conftest import invoke
+from tests.wavy import wavy as study
 from tests.wavy.wavy import AXES, lines, wavy
 
 pytestmark = pytest.mark.slow
 
 
-def test_a_hull_learnt_in_waves_serves_in_calm_water(tmp_path: Path) -> None:
+def test_a_hull_learnt_in_waves_serves_in_calm_water(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def here(*arguments: str) -> dict[str, Any]:
+        run = invoke(*arguments, "--json", "-")
+        assert run.code == 0, run.err
+        return dict(json.loads(run.out))
+
+    # Without eight processes that begin by importing everything.
+    monkeypatch.setattr(study, "_ferryid", here)
     told = wavy(tmp_path, rounds=1)
     corrected, fitted, diagnosed = told["fit --estimator derivative"], told["fit"], told["diagnose"]
     assert corrected["mse"]["sway"] > 1.1
