@@ -27,17 +27,25 @@ def shared_data() -> Callable[[str], Path]:
 def pytest_collection_modifyitems(items: list[Any]) -> None:
     """Begin with the slow tests, one by one, and keep those together that share fixtures, or are quick, in a file.
 
-    A worker that takes its last test early has nothing to do while the other one is at a slow test; a fixture of a file is
-    made again by every worker that takes a test of it.
+    A worker that takes its last test early has nothing to do while the other one is at a slow test; a fixture of a file, and
+    what a function in it keeps (`functools.cache`), is made again by every worker that takes a test of it.
     """
     for item in items:
         definitions = item._fixtureinfo.name2fixturedefs.values()
-        shares = any(one[-1].scope in ("module", "class") for one in definitions)
+        shares = any(one[-1].scope in ("module", "class") for one in definitions) or _keeps(item.module)
         if shares or item.get_closest_marker("slow") is None:
             item.add_marker(pytest.mark.xdist_group(item.nodeid.partition("::")[0]))
     slow = {item.nodeid.partition("::")[0] for item in items if item.get_closest_marker("slow")}
     # Stable: files stay in their order.
     items.sort(key=lambda item: item.nodeid.partition("::")[0] not in slow)
+
+
+def _keeps(module: Any) -> bool:
+    """Tell whether a file of tests has a function of its own whose results are kept."""
+    return any(
+        hasattr(one, "cache_clear") and getattr(one, "__module__", "") == module.__name__
+        for one in vars(module).values()
+    )
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
