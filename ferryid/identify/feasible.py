@@ -233,7 +233,7 @@ class _Problem:
         phi = np.where(motion, phi, 0.0)
         base = motion_force(self.profile, self.scale, still, points, across[:, 0])
         power = np.linalg.solve(self.G(flat).T, points.T).T
-        terms, axes = (np.array(part) for part in zip(*self.places, strict=True))
+        terms, axes = np.array(self.places, dtype=np.int64).reshape(-1, 2).T
         slopes = power[:, axes] * phi[:, terms]
         slopes[:, np.isin(terms, list(self.acceleration.values()))] = 0.0
         levels = (-np.einsum("pi,pi->p", points, base)).tolist()
