@@ -11,6 +11,7 @@ import typer
 from typer.core import TyperGroup
 
 import ferryid
+from ferryid.cli.defaults import DefaultsCommand
 
 HELP = {"help_option_names": ["-h", "--help"]}
 
@@ -23,26 +24,34 @@ class _Commands(TyperGroup):
 
     def __init__(self, **attributes: Any) -> None:
         super().__init__(**attributes)
-        files = (file.removesuffix(".py") for file in os.listdir(os.path.dirname(__file__)))
         # Read by the suggestion for a misspelt name alone.
-        self.commands = dict.fromkeys(sorted(file.removeprefix("cmd_") for file in files if file.startswith("cmd_")))
+        self.commands = dict.fromkeys(command_names())
 
     def list_commands(self, ctx: typer.Context) -> list[str]:
         return list(self.commands)
 
     def get_command(self, ctx: typer.Context, cmd_name: str) -> Any:
-        if cmd_name not in self.commands:
-            return None
-        module = _module(cmd_name)
-        if hasattr(module, "app"):
-            return typer.main.get_command(module.app)
-        alone = typer.Typer(add_completion=False, rich_markup_mode=None, context_settings=HELP)
-        alone.command(cmd_name, cls=getattr(module, "Command", None))(module.command)
-        return typer.main.get_command(alone)
+        return built(cmd_name) if cmd_name in self.commands else None
 
     def format_commands(self, ctx: typer.Context, formatter: Any) -> None:
         with formatter.section("Commands"):
             formatter.write_dl([(name, _summary(_module(name))) for name in self.commands])
+
+
+def command_names() -> list[str]:
+    """Return the names of all commands, in alphabetical order."""
+    files = (file.removesuffix(".py") for file in os.listdir(os.path.dirname(__file__)))
+    return sorted(file.removeprefix("cmd_") for file in files if file.startswith("cmd_"))
+
+
+def built(name: str) -> Any:
+    """Return the command of a name."""
+    module = _module(name)
+    if hasattr(module, "app"):
+        return typer.main.get_command(module.app)
+    alone = typer.Typer(add_completion=False, rich_markup_mode=None, context_settings=HELP)
+    alone.command(name, cls=getattr(module, "Command", DefaultsCommand))(module.command)
+    return typer.main.get_command(alone)
 
 
 def _module(name: str) -> ModuleType:

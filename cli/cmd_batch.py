@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ferryid.cli.options import OUT, Json, MaybeVessel, Out
+from ferryid.cli.options import OUT, Json, Out, Vessel
 from ferryid.cli.output import emit, progress, tell
 
 
@@ -23,7 +23,7 @@ def command(
         Path | None,
         typer.Option(help="TOML file: which steps, with which settings; all with their defaults if left out."),
     ] = None,
-    vessel: MaybeVessel = None,
+    vessel: Vessel = None,
     processes: Annotated[int, typer.Option(help="Processes to share the logs among.")] = 2,
     dask: Annotated[
         str | None,
@@ -40,7 +40,7 @@ def command(
     from ferryid import api
 
     outcome = api.batch(
-        logs, out, vessel=vessel, recipe=recipe, processes=processes, dask=dask, memory_limit=memory, again=again,
+        logs, out, vessel=vessel or None, recipe=recipe, processes=processes, dask=dask, memory_limit=memory, again=again,
         progress=progress, tell=tell,
     )  # fmt: skip
     emit(outcome, json)

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from ferryid.cli.options import OUT, Json, MaybeVessel, Out
-from ferryid.cli.output import emit, progress
+from ferryid.cli.options import OUT, Json, ModelVessel, Out
+from ferryid.cli.output import emit, progress, tell
 from ferryid.cli.several import several_after
 
 Command = several_after("--on")
@@ -22,7 +22,7 @@ def command(
             "--on", help="Logs to compare them on, one or several; without them only coefficients are compared."
         ),
     ] = None,
-    vessel: MaybeVessel = None,
+    vessel: ModelVessel = None,
     window: Annotated[float, typer.Option(help="Smoothing window [s] of the test data, the same for all.")] = 1.0,
     out: Out = OUT,
     json: Json = None,
@@ -37,6 +37,6 @@ def command(
 
     words = ("ferryid", *sys.argv[1:])
     outcome = api.compare(
-        models, on or (), out, vessel=vessel or None, window_s=window, command=words, progress=progress
+        models, on or (), out, vessel=vessel or None, window_s=window, command=words, progress=progress, tell=tell
     )
     emit(outcome, json)

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from ferryid.cli.options import OUT, Json, Logs, MaybeVessel, Out, Verify
-from ferryid.cli.output import emit, progress
+from ferryid.cli.options import OUT, Json, Logs, Out, Verify, Vessel
+from ferryid.cli.output import emit, progress, tell
 from ferryid.cli.several import several_after
 
 Command = several_after("--versus", "--reference")
@@ -16,7 +16,7 @@ Command = several_after("--versus", "--reference")
 
 def command(
     logs: Logs,
-    vessel: MaybeVessel = None,
+    vessel: Vessel = None,
     model: Annotated[
         str | None, typer.Option(help="Model to examine: path, name or name@version; the profile's hull if left out.")
     ] = None,
@@ -66,12 +66,21 @@ def command(
     words = ("ferryid", *sys.argv[1:])
     if versus:
         outcome = api.compare_groups(
-            logs, versus, vessel, out, model=model, settings=settings, name=name, command=words, verify=verify,
-            progress=progress,
+            logs, versus, vessel or None, out, model=model, settings=settings, name=name, command=words, verify=verify,
+            progress=progress, tell=tell,
         )  # fmt: skip
         emit(outcome, json)
         return
     outcome = api.diagnose(
-        logs, vessel, out, model=model, settings=settings, name=name, command=words, verify=verify, progress=progress
+        logs,
+        vessel or None,
+        out,
+        model=model,
+        settings=settings,
+        name=name,
+        command=words,
+        verify=verify,
+        progress=progress,
+        tell=tell,
     )
     emit(outcome, json)

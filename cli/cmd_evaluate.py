@@ -6,14 +6,14 @@ from typing import Annotated
 
 import typer
 
-from ferryid.cli.options import OUT, Json, Logs, MaybeVessel, Out
-from ferryid.cli.output import emit, progress
+from ferryid.cli.options import OUT, Json, Logs, ModelVessel, Out
+from ferryid.cli.output import emit, progress, tell
 
 
 def command(
     model: Annotated[str, typer.Argument(help="Path of a model file, name, or name@version.")],
     logs: Logs,
-    vessel: MaybeVessel = None,
+    vessel: ModelVessel = None,
     window: Annotated[
         float | None, typer.Option(help="Smoothing window [s] of the test data; the model's own if left out.")
     ] = None,
@@ -23,4 +23,5 @@ def command(
     """Judge a model on other logs: force MSE and R² per axis, free-run error."""
     from ferryid import api
 
-    emit(api.evaluate(model, logs, out, vessel=vessel or None, window_s=window, progress=progress), json)
+    outcome = api.evaluate(model, logs, out, vessel=vessel or None, window_s=window, progress=progress, tell=tell)
+    emit(outcome, json)

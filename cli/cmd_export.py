@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ferryid.cli.options import OUT, Json, MaybeVessel, Out
+from ferryid.cli.options import OUT, Json, Out, Vessel
 from ferryid.cli.output import emit, progress, tell
 from ferryid.export.formats import names
 
@@ -20,7 +20,7 @@ def command(
     file: Annotated[Path | None, typer.Option(help="File for a model; one in exports/ of --out if left out.")] = None,
     mcap: Annotated[Path | None, typer.Option(help="MCAP file for a log: its forces, motion and findings.")] = None,
     model: Annotated[str | None, typer.Option(help="With --mcap: the model to compare with the log.")] = None,
-    vessel: MaybeVessel = None,
+    vessel: Vessel = None,
     diagnosis: Annotated[Path | None, typer.Option(help="With --mcap: JSON of ferryid diagnose on this log.")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an export that is there.")] = False,
     out: Out = OUT,
@@ -31,8 +31,8 @@ def command(
     from ferryid.export.commands import notes
 
     outcome = api.export(
-        what, out, to=to, file=file, mcap=mcap, model=model, vessel=vessel, diagnosis=diagnosis, overwrite=overwrite,
-        json=None if json in (None, "-") else Path(json), progress=progress,
+        what, out, to=to, file=file, mcap=mcap, model=model, vessel=vessel or None, diagnosis=diagnosis, overwrite=overwrite,
+        json=None if json in (None, "-") else Path(json), progress=progress, tell=tell,
     )  # fmt: skip
     for note in notes(outcome.json):
         tell(f"ferryid: {note}")

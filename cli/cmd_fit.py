@@ -27,12 +27,12 @@ from ferryid.cli.options import (
     Zeta,
     given,
 )
-from ferryid.cli.output import emit, progress
+from ferryid.cli.output import emit, progress, tell
 
 
 def command(
-    vessel: Vessel,
     logs: MaybeLogs = None,
+    vessel: Vessel = None,
     name: Annotated[str, typer.Option(help="Name of the model in the store; the vessel's if left out.")] = "",
     basis: Basis = "modulus",
     structure: Structure = "decoupled",
@@ -77,7 +77,9 @@ def command(
         zeta=zeta, seed=seed, weak_window_s=weak_window,
     )  # fmt: skip
     chosen = logs or () if archive else given(logs)
-    outcome = api.fit(chosen, vessel, settings, out, name=name, archive=archive, verify=verify, progress=progress)
+    outcome = api.fit(
+        chosen, vessel or None, settings, out, name=name, archive=archive, verify=verify, progress=progress, tell=tell
+    )
     emit(outcome, json)
     if require_accept and not outcome.accepted:
         raise typer.Exit(3)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from ferryid.cli.options import OUT, Json, Logs, Out, Verify, Vessel
-from ferryid.cli.output import emit, progress
+from ferryid.cli.output import emit, progress, tell
 
 
-def command(logs: Logs, vessel: Vessel, out: Out = OUT, verify: Verify = False, json: Json = None) -> None:
+def command(logs: Logs, vessel: Vessel = None, out: Out = OUT, verify: Verify = False, json: Json = None) -> None:
     """Read logs into Parquet tables with SNAME column names, SI units and provenance."""
     from ferryid import api
 
-    emit(api.ingest(logs, vessel, out, verify=verify, progress=progress), json)
+    emit(api.ingest(logs, vessel or None, out, verify=verify, progress=progress, tell=tell), json)

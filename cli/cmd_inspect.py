@@ -6,17 +6,17 @@ from typing import Annotated
 
 import typer
 
-from ferryid.cli.options import Json, MaybeVessel, Verify
-from ferryid.cli.output import emit, text_width
+from ferryid.cli.options import Json, Verify, Vessel
+from ferryid.cli.output import emit, tell, text_width
 
 
 def command(
     log: Annotated[str, typer.Argument(help="A bag, MCAP file, table or folder.")],
-    vessel: MaybeVessel = None,
+    vessel: Vessel = None,
     verify: Verify = False,
     json: Json = None,
 ) -> None:
     """Show topics, types, counts, rates, gaps, clocks, and the signals that a vessel profile finds."""
     from ferryid import api
 
-    emit(api.inspect(log, vessel or None, verify=verify, width=text_width()), json)
+    emit(api.inspect(log, vessel or None, verify=verify, width=text_width(), tell=tell), json)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ferryid.cli.options import OUT, Json, Out
-from ferryid.cli.output import emit, progress
+from ferryid.cli.options import OUT, Json, ModelVessel, Out
+from ferryid.cli.output import emit, progress, tell
 from ferryid.errors import FerryIdError
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def command(
             show_default=False,
         ),
     ] = None,
-    vessel: Annotated[str, typer.Option(help="Vessel profile of the logs, in place of the models' own.")] = "",
+    vessel: ModelVessel = None,
     force: Annotated[bool, typer.Option("--force", help="Promote although the replay found it worse.")] = False,
     to: Annotated[int | None, typer.Option(help="Version to roll back to; the one before if left out.")] = None,
     out: Out = OUT,
@@ -36,7 +36,9 @@ def command(
 
     first, *others = words or [""]
     if first == "promote" and others:
-        promoted = api.promote(others[0], others[1:], out, vessel=vessel or None, force=force, progress=progress)
+        promoted = api.promote(
+            others[0], others[1:], out, vessel=vessel or None, force=force, progress=progress, tell=tell
+        )
         emit(promoted, json)
         if not promoted.json["promoted"]:
             raise typer.Exit(3)

@@ -24,13 +24,13 @@ from ferryid.cli.options import (
     Zeta,
     given,
 )
-from ferryid.cli.output import emit, progress
+from ferryid.cli.output import emit, progress, tell
 
 
 def command(
     what: Annotated[str, typer.Argument(help="components, window, both at once, or basis.")],
-    vessel: Vessel,
     logs: MaybeLogs = None,
+    vessel: Vessel = None,
     windows: Annotated[str, typer.Option(help="Windows to try [s], as 0.5,1,2; a usual range if left out.")] = "",
     window: Annotated[float, typer.Option(help="Smoothing window [s] for sweeps of components or basis.")] = 1.0,
     components: Annotated[
@@ -71,12 +71,13 @@ def command(
     outcome = api.sweep(
         what,
         chosen,
-        vessel,
+        vessel or None,
         settings,
         out,
         windows_s=parse_windows(windows),
         folds=folds,
         archive=archive,
         progress=progress,
+        tell=tell,
     )
     emit(outcome, json)

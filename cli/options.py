@@ -18,9 +18,19 @@ MaybeLogs = Annotated[
     list[str] | None,
     typer.Argument(help="Bags, MCAP files, CSV or Parquet tables, or folders; parts of one log joined by +."),
 ]
-Vessel = Annotated[str, typer.Option("--vessel", help="Name of a bundled vessel profile, or the path of a TOML file.")]
-MaybeVessel = Annotated[
-    str | None, typer.Option("--vessel", help="Name of a bundled vessel profile, or the path of a TOML file.")
+Vessel = Annotated[
+    str | None,
+    typer.Option(
+        "--vessel",
+        help="Vessel profile: a name, or the path of a TOML file; found by the logs if left out (vessel.toml or ferryid.toml "
+        "beside them or above, $FERRYID_VESSEL, or the one profile that fits).",
+    ),
+]
+ModelVessel = Annotated[
+    str | None,
+    typer.Option(
+        "--vessel", help="Vessel profile of the logs, in place of the model's: a name, or the path of a TOML file."
+    ),
 ]
 Out = Annotated[Path, typer.Option("--out", help="Folder for tables, models and reports.")]
 Json = Annotated[

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from typer.core import TyperCommand
-
+from ferryid.cli.defaults import DefaultsCommand
 from ferryid.errors import FerryIdError
 
 
-def several_after(*options: str) -> type[TyperCommand]:
+def several_after(*options: str) -> type[DefaultsCommand]:
     """Return a command that takes several words after some options, as ``--on a.bag b.bag``."""
 
-    class Command(TyperCommand):
+    class Command(DefaultsCommand):
         def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
             """Repeat such an option before every word that follows it, up to the next option."""
             written: list[str] = []

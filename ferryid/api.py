@@ -3,7 +3,7 @@
 ```python
 from ferryid import api
 
-fit = api.fit("bag.mcap", "milliampere")
+fit = api.fit("bag.mcap")
 print(fit)              # as the terminal shows it; a notebook shows the report
 fit.json["scores"]      # as --json writes it
 fit.stored.model        # the model itself
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from ferryid.report.fit_report import FitReport
     from ferryid.report.outcome import Outcome, Report
     from ferryid.types import RunContext
+    from ferryid.vessel.choice import VesselChoice
     from ferryid.vessel.profile import Profile
 
 __all__ = [
@@ -76,6 +77,45 @@ def _profile(vessel: str | Path | Profile) -> Profile:
     return vessel if isinstance(vessel, Profile) else load_profile(str(vessel))
 
 
+def _told(choice: VesselChoice | None, tell: Progress) -> Profile | None:
+    """Return the profile of a choice, and tell it where it was not asked for."""
+    if choice is not None and choice.reason:
+        tell(choice.reason)
+    return None if choice is None else choice.profile
+
+
+def _chosen(logs: Sequence[str], vessel: str | Path | Profile | None, tell: Progress) -> Profile:
+    """Return the vessel of logs, and tell which one was found where it was not asked for."""
+    from ferryid.vessel import choose_vessel
+
+    choice = choose_vessel(logs, vessel)
+    _told(choice, tell)
+    return choice.profile
+
+
+def _of_archive(out: Path, vessel: str | Path | Profile | None, tell: Progress) -> Profile:
+    """Return the vessel whose ingested logs are used, and tell which one was found where it was not asked for."""
+    from ferryid.identify import archived_vessel
+
+    if vessel is not None:
+        return _profile(vessel)
+    choice = archived_vessel(out)
+    _told(choice, tell)
+    return choice.profile
+
+
+def _for_model(
+    model: Model, logs: Sequence[str], vessel: str | Path | Profile | None, tell: Progress
+) -> Profile | None:
+    """Return the profile to read logs with beside a model; None where the model's own serves."""
+    from ferryid.vessel import choose_vessel, parse_profile
+
+    own = parse_profile(model.profile_text, model.name)
+    choice = choose_vessel(logs, vessel, own=own)
+    _told(choice, tell)
+    return None if choice.profile is own else choice.profile
+
+
 def _model(model: str | Path | Model, out: Path) -> Model:
     from ferryid.models import Model
     from ferryid.models.store import load
@@ -96,7 +136,12 @@ def _outcome(result: Mapping[str, Any], text: str) -> Outcome:
 
 
 def inspect(
-    log: str | Path, vessel: str | Path | Profile | None = None, *, verify: bool = False, width: int = 160
+    log: str | Path,
+    vessel: str | Path | Profile | None = None,
+    *,
+    verify: bool = False,
+    width: int = 160,
+    tell: Progress = _quiet,
 ) -> Outcome:
     """Return topics, types, counts, rates, gaps and clocks of a log, and the signals that a vessel's profile finds in it.
 
@@ -105,38 +150,45 @@ def inspect(
     log
         Path; parts of one recording joined by ``+``.
     vessel
-        Name of a bundled profile, the path of a TOML file, or a profile.
+        Name of a profile, the path of a TOML file, or a profile; what is stated beside the log or in ``$FERRYID_VESSEL`` where
+        None, and where nothing is, every profile that has a name is tried.
     verify
         Read the whole file and check every checksum.
     width
         Of the text, in characters.
+    tell
+        Called with the vessel that is stated.
     """
     from ferryid.signals.inspect import inspect as inspect_log
     from ferryid.signals.inspect import render_inspect
+    from ferryid.vessel import stated_choice
 
-    result = inspect_log(str(log), None if vessel is None else _profile(vessel), verify=verify)
+    profile = _profile(vessel) if vessel is not None else _told(stated_choice([str(log)]), tell)
+    result = inspect_log(str(log), profile, verify=verify)
     return _outcome(result, render_inspect(result, width))
 
 
 def ingest(
     logs: Logs,
-    vessel: str | Path | Profile,
+    vessel: str | Path | Profile | None = None,
     out: str | Path = OUT,
     *,
     verify: bool = False,
     progress: Progress = _quiet,
+    tell: Progress = _quiet,
 ) -> Outcome:
     """Read logs into Parquet tables with SNAME column names, SI units and provenance."""
     from ferryid.signals.ingest import ingest as ingest_logs
     from ferryid.signals.ingest import render_ingest
 
-    result = ingest_logs(_paths(logs), _profile(vessel), Path(out), verify=verify, progress=progress)
+    paths = _paths(logs)
+    result = ingest_logs(paths, _chosen(paths, vessel, tell), Path(out), verify=verify, progress=progress)
     return _outcome(result, render_ingest(result))
 
 
 def fit(
     logs: Logs,
-    vessel: str | Path | Profile,
+    vessel: str | Path | Profile | None = None,
     settings: FitSettings | None = None,
     out: str | Path = OUT,
     *,
@@ -144,6 +196,7 @@ def fit(
     archive: bool = False,
     verify: bool = False,
     progress: Progress = _quiet,
+    tell: Progress = _quiet,
 ) -> FitReport:
     """Fit a model to logs, validate it, store it and write its report.
 
@@ -152,7 +205,8 @@ def fit(
     logs
         What to fit to; with `archive`, which of the ingested logs, all where empty.
     vessel
-        Name of a bundled profile, the path of a TOML file, or a profile.
+        Name of a profile, the path of a TOML file, or a profile; found by the logs where None, see
+        `ferryid.vessel.choose_vessel`, and with `archive` by what was ingested.
     settings
         How to fit: `ferryid.identify.FitSettings`, its defaults where None.
     out
@@ -163,14 +217,16 @@ def fit(
         Fit to the sums kept of ingested logs; no log is read.
     verify
         Read whole files and check every checksum.
+    tell
+        Called with the vessel that was found.
     """
     from ferryid.identify import FitSettings
     from ferryid.report.fit_report import fit_and_report, fit_archive_and_report
 
-    settings, run = settings or FitSettings(), _context(out, progress, verify)
+    settings, run, paths = settings or FitSettings(), _context(out, progress, verify), _paths(logs)
     if archive:
-        return fit_archive_and_report(_profile(vessel), settings, run, _paths(logs), name=name)
-    return fit_and_report(_paths(logs), _profile(vessel), settings, run, name=name)
+        return fit_archive_and_report(_of_archive(run.out, vessel, tell), settings, run, paths, name=name)
+    return fit_and_report(paths, _chosen(paths, vessel, tell), settings, run, name=name)
 
 
 def evaluate(
@@ -181,6 +237,7 @@ def evaluate(
     vessel: str | Path | Profile | None = None,
     window_s: float | None = None,
     progress: Progress = _quiet,
+    tell: Progress = _quiet,
 ) -> Outcome:
     """Judge a model on other logs: mean square of the force errors and R² per axis, errors of free runs.
 
@@ -190,8 +247,9 @@ def evaluate(
     from ferryid.compare import evaluate as evaluate_model
     from ferryid.report.evaluation_text import render_evaluation
 
-    run, profile = _context(out, progress), None if vessel is None else _profile(vessel)
-    result = evaluate_model(_model(model, run.out), _paths(logs), run, profile=profile, window_s=window_s)
+    run, judged, paths = _context(out, progress), _model(model, Path(out)), _paths(logs)
+    profile = _for_model(judged, paths, vessel, tell)
+    result = evaluate_model(judged, paths, run, profile=profile, window_s=window_s)
     return _outcome(result, render_evaluation(result))
 
 
@@ -204,6 +262,7 @@ def compare(
     window_s: float = 1.0,
     command: Sequence[str] = (),
     progress: Progress = _quiet,
+    tell: Progress = _quiet,
 ) -> Report:
     """Compare models on the same rows of logs, and by their coefficients; without logs by their coefficients alone.
 
@@ -227,10 +286,13 @@ def compare(
     from ferryid.models.store import load
     from ferryid.report.comparison_report import report
 
-    run = _context(out, progress)
+    run, paths = _context(out, progress), _paths(on)
+    loaded = [load(name, run.out) for name in models]
     profile = None if vessel is None else _profile(vessel)
-    field = select_candidates(models, [load(name, run.out) for name in models], profile)
-    comparison = compare_models(field, _paths(on), run, window_s=window_s)
+    if profile is None and loaded and paths:
+        profile = _for_model(loaded[0], paths, None, tell)
+    field = select_candidates(models, loaded, profile)
+    comparison = compare_models(field, paths, run, window_s=window_s)
     progress("writing the report")
     outcome = report(comparison, run.out, command)
     progress("")
@@ -240,7 +302,7 @@ def compare(
 def sweep(
     what: Literal["components", "window", "both", "basis"] | str,
     logs: Logs,
-    vessel: str | Path | Profile,
+    vessel: str | Path | Profile | None = None,
     settings: FitSettings | None = None,
     out: str | Path = OUT,
     *,
@@ -248,13 +310,16 @@ def sweep(
     folds: int | None = None,
     archive: bool = False,
     progress: Progress = _quiet,
+    tell: Progress = _quiet,
 ) -> Report:
     """Cross-validate component counts, smoothing windows [s], or bases and structures, and mark which to fit with."""
     from ferryid.identify import FOLDS, FitSettings
     from ferryid.report.structures_report import structures_and_report
     from ferryid.report.sweep_report import sweep_and_report
 
-    arguments = (_paths(logs), _profile(vessel), settings or FitSettings(), _context(out, progress))
+    paths = _paths(logs)
+    profile = _of_archive(Path(out), vessel, tell) if archive else _chosen(paths, vessel, tell)
+    arguments = (paths, profile, settings or FitSettings(), _context(out, progress))
     given = {"windows_s": windows_s, "folds": FOLDS if folds is None else folds, "archive": archive}
     if what == "basis":
         return structures_and_report(*arguments, **given)  # type: ignore[arg-type]
@@ -272,6 +337,7 @@ def diagnose(
     command: Sequence[str] = (),
     verify: bool = False,
     progress: Progress = _quiet,
+    tell: Progress = _quiet,
 ) -> Report:
     """Say which physics a model left out of recordings, what shows it, and store the model that has it.
 
@@ -280,7 +346,7 @@ def diagnose(
     logs
         Recordings of one vessel.
     vessel
-        Its profile; that of `model` where None.
+        Its profile; that of `model`, or found by the recordings, where None.
     out
         Output folder.
     model
@@ -297,9 +363,10 @@ def diagnose(
     """
     from ferryid.report.diagnosis_report import diagnose_and_report
 
-    profile, examined = _examined(vessel, model, out, settings)
+    paths = _paths(logs)
+    profile, examined = _examined(paths, vessel, model, out, settings, tell)
     run = _context(out, progress, verify)
-    outcome = diagnose_and_report(_paths(logs), profile, examined, run, name=name, command=command)
+    outcome = diagnose_and_report(paths, profile, examined, run, name=name, command=command)
     progress("")
     return outcome
 
@@ -316,6 +383,7 @@ def compare_groups(
     command: Sequence[str] = (),
     verify: bool = False,
     progress: Progress = _quiet,
+    tell: Progress = _quiet,
 ) -> Report:
     """Estimate in which properties and loads two groups of recordings of one vessel differ: ``diagnose LOGS --versus VERSUS``.
 
@@ -332,20 +400,30 @@ def compare_groups(
     """
     from ferryid.report.versus_report import compare_and_report
 
-    profile, examined = _examined(vessel, model, out, settings)
+    paths, others = _paths(logs), _paths(versus)
+    profile, examined = _examined([*paths, *others], vessel, model, out, settings, tell)
     run = _context(out, progress, verify)
-    outcome = compare_and_report(_paths(logs), _paths(versus), profile, examined, run, name=name, command=command)
+    outcome = compare_and_report(paths, others, profile, examined, run, name=name, command=command)
     progress("")
     return outcome
 
 
 def _examined(
-    vessel: str | Path | Profile | None, model: str | None, out: str | Path, settings: DiagnosisSettings | None
+    logs: Sequence[str],
+    vessel: str | Path | Profile | None,
+    model: str | None,
+    out: str | Path,
+    settings: DiagnosisSettings | None,
+    tell: Progress,
 ) -> tuple[Profile, DiagnosisSettings]:
     """Return the vessel of a diagnosis, and its settings with the model that is examined."""
     from ferryid.diagnose import DiagnosisSettings
     from ferryid.report.diagnosis_report import patient
 
+    if not model:
+        vessel = _chosen(logs, vessel, tell)
+    elif not vessel:
+        vessel = _for_model(_model(model, Path(out)), logs, None, tell)
     profile, examined = patient(vessel, model, Path(out))
     return profile, replace(settings or DiagnosisSettings(), model=examined)
 
@@ -387,6 +465,7 @@ def export(
     overwrite: bool = False,
     json: Path | None = None,
     progress: Progress = _quiet,
+    tell: Progress = _quiet,
 ) -> Outcome:
     """Write a model as code or parameters for other programs, or with `mcap` a log and its forces for a viewer.
 
@@ -397,7 +476,7 @@ def export(
 
     result = write_export(
         str(what), Path(out), to=to, file=file, mcap=mcap, model=model, vessel=vessel, diagnosis=diagnosis,
-        overwrite=overwrite, json=json, progress=progress,
+        overwrite=overwrite, json=json, progress=progress, tell=tell,
     )  # fmt: skip
     progress("")
     return _outcome(result, render_export(result))
@@ -429,6 +508,7 @@ def promote(
     vessel: str | Path | Profile | None = None,
     force: bool = False,
     progress: Progress = _quiet,
+    tell: Progress = _quiet,
 ) -> Outcome:
     """Make a stored version the current one, after a replay of it and of the present one on logs; ``json["promoted"]`` tells.
 
@@ -449,7 +529,10 @@ def promote(
     from ferryid.report.promotion import promote_version
 
     run = _context(out, progress)
-    told = promote_version(model, _paths(on), run, None if vessel is None else _profile(vessel), force=force)
+    paths, profile = _paths(on), None if vessel is None else _profile(vessel)
+    if profile is None and paths and "@" in model:
+        profile = _for_model(_model(model, run.out), paths, None, tell)
+    told = promote_version(model, paths, run, profile, force=force)
     progress("")
     return _outcome(*told)
 
@@ -499,10 +582,10 @@ def simulate(
 
 
 def vessels() -> Outcome:
-    """Return the bundled vessel profiles."""
-    from ferryid.vessel import bundled, load_profile
+    """Return the vessel profiles that have a name: the bundled ones and those in the user's folder for configuration."""
+    from ferryid.vessel import known, load_profile
 
-    profiles = [load_profile(name) for name in bundled()]
+    profiles = [load_profile(name) for name in known()]
     listed = [{"name": one.name, "title": one.title, "source": one.source} for one in profiles]
     text = "\n".join(f"{one.name:<18} {one.title}" for one in profiles)
     return _outcome({"schema": "ferryid.vessels/1", "vessels": listed}, text)

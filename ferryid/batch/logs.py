@@ -37,12 +37,15 @@ class Entry:
         When it was recorded, where a manifest says so; ISO 8601, UTC.
     note
         The manifest's.
+    problem
+        Why no vessel could be found for it; empty where one was, or the model brings it.
     """
 
     log: str
     vessel: str | None = None
     date: str | None = None
     note: str = ""
+    problem: str = ""
 
     @property
     def paths(self) -> list[Path]:

@@ -10,6 +10,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
@@ -37,6 +38,7 @@ from ferryid.report.batch_page import render
 from ferryid.report.batch_rows import BatchResult, MemoryUse
 from ferryid.report.diagnosis_report import patient
 from ferryid.signals.recording import log_name
+from ferryid.vessel import choose_vessel
 from ferryid.vessel.profile import Profile
 
 SCHEMA = "ferryid.batch/1"
@@ -68,7 +70,7 @@ def batch(
     out
         Output folder. On a cluster, all workers must see it, and the logs, under the same path.
     vessel
-        Of logs whose manifest names none.
+        Of logs whose manifest names none; found for each log where None, see `ferryid.vessel.choose_vessel`.
     recipe
         What is done: see `ferryid.batch.recipe`; all steps with their defaults where None.
     processes, dask
@@ -92,15 +94,17 @@ def batch(
     limit = memory.size_bytes(memory_limit)
     chosen = Recipe() if recipe is None else load_recipe(recipe)
     entries = entries_of(asked, vessel, tell)
+    if not chosen.model:
+        entries = _with_vessels(entries, tell)
     patients = _patients(entries, chosen, out)
     folder = (out / "batch").resolve()
     with alone(folder, wait=False):
         remove_abandoned(out / "logs")
         kept = Kept(folder / "results")
-        tasks = [_task(entry, patients[entry.vessel], chosen, limit, again, out.resolve()) for entry in entries]
+        tasks = [_task(entry, patients.get(entry.vessel), chosen, limit, again, out.resolve()) for entry in entries]
         rows: dict[int, tuple[Path, LogResult]] = {}
         for number, (entry, task) in enumerate(zip(entries, tasks, strict=True)):
-            table = patients[entry.vessel][0].table
+            table = None if entry.problem else patients[entry.vessel][0].table
             found = kept.of(task.folder, task.files, task.stamp, partial(_content, task.log, table))
             if found is not None and task.stands(found[1]):
                 rows[number] = found
@@ -119,27 +123,43 @@ def batch(
     return result
 
 
+def _with_vessels(entries: Sequence[Entry], tell: Callable[[str], None]) -> list[Entry]:
+    """Return logs each with its vessel, or why none could be found; one line for every vessel that was found."""
+    found, lines = list[Entry](), Counter[str]()
+    for entry in entries:
+        if entry.vessel is not None:
+            found.append(entry)
+            continue
+        try:
+            choice = choose_vessel(["+".join(map(str, entry.paths))])
+        except FerryIdError as error:
+            found.append(replace(entry, problem=str(error)))
+            continue
+        lines[choice.reason] += 1
+        found.append(replace(entry, vessel=choice.reference))
+    for line, count in lines.items():
+        tell(f"{counted(count, 'log')} of {line}")
+    return found
+
+
 def _patients(entries: Sequence[Entry], recipe: Recipe, out: Path) -> dict[str | None, tuple[Profile, Model | None]]:
-    """Return profile and model for the vessel of every log."""
+    """Return profile and model for the vessel of every log that has one."""
     found: dict[str | None, tuple[Profile, Model | None]] = {}
     for entry in entries:
-        if entry.vessel not in found:
-            if entry.vessel is None and not recipe.model:
-                raise FerryIdError(
-                    f"batch: no vessel is given for the log {entry.log}, found neither --vessel nor a model nor a manifest "
-                    "that names it. Fix: give --vessel a bundled profile's name or a TOML file"
-                )
+        if entry.vessel not in found and not entry.problem:
             found[entry.vessel] = patient(entry.vessel, recipe.model or None, out)
     return found
 
 
-def _task(entry: Entry, of: tuple[Profile, Model | None], recipe: Recipe, limit: int, again: bool, out: Path) -> Task:
-    profile, model = of
+def _task(
+    entry: Entry, of: tuple[Profile, Model | None] | None, recipe: Recipe, limit: int, again: bool, out: Path
+) -> Task:
+    profile, model = (None, None) if of is None else of
     text = None if model is None else dump_json(model_to_json(model))
     stamp = {
         "version": __version__,
         "recipe": _hash(dump_json(recipe.plain())),
-        "profile": profile.sha256,
+        "profile": _hash(entry.problem) if profile is None else profile.sha256,
         "model": "" if text is None else _hash(text),
     }
     log, paths = "+".join(map(str, entry.paths)), entry.paths
@@ -152,13 +172,14 @@ def _task(entry: Entry, of: tuple[Profile, Model | None], recipe: Recipe, limit:
         place,
         out,
         entry.vessel or "",
-        profile.text,
-        profile.path,
+        "" if profile is None else profile.text,
+        "" if profile is None else profile.path,
         text,
         recipe,
         stamp,
         limit,
         again,
+        entry.problem,
     )
 
 
@@ -235,7 +256,7 @@ def _summed_up(
     begun: float,
 ) -> BatchResult:
     root = out / "batch"
-    vessels = [patients[entry.vessel][0].name for entry in entries]
+    vessels = ["" if entry.problem else patients[entry.vessel][0].name for entry in entries]
     rows = tuple(
         summary_row(entry, name, row, folder.name)
         for entry, name, (folder, row) in zip(entries, vessels, found, strict=True)

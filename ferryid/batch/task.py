@@ -61,6 +61,8 @@ class Task:
         The bound.
     again
         True: done again if it went wrong.
+    problem
+        Why the log cannot be used, where that is known before it is read.
     """
 
     log: str
@@ -76,6 +78,7 @@ class Task:
     stamp: Mapping[str, str]
     memory_bytes: int
     again: bool = False
+    problem: str = ""
 
     def row(self, status: str, reason: str = "") -> LogResult:
         """Return a row without results."""
@@ -161,6 +164,8 @@ def _carry_out(task: Task, row: LogResult) -> Iterator[LogResult]:
     from ferryid.signals.recording import record
     from ferryid.vessel import parse_profile
 
+    if task.problem:
+        raise FerryIdError(task.problem)
     profile = parse_profile(task.profile_text, task.profile_path)
     model = None if task.model_text is None else model_from_json(json.loads(task.model_text), "the model of the recipe")
     begun = time.perf_counter()

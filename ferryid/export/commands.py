@@ -13,7 +13,8 @@ from ferryid.export.log_file import export_log
 from ferryid.export.model_file import export_model
 from ferryid.files import check_result
 from ferryid.models.store import load
-from ferryid.vessel import load_profile
+from ferryid.types import no_progress
+from ferryid.vessel import choose_vessel, parse_profile
 
 
 def export(
@@ -29,6 +30,7 @@ def export(
     overwrite: bool = False,
     json: Path | None = None,
     progress: Callable[[str], None],
+    tell: Callable[[str], None] = no_progress,
 ) -> dict[str, Any]:
     """Export a model, or with `mcap` a log; return what was written (``ferryid.export/1``).
 
@@ -48,6 +50,8 @@ def export(
         Where the caller will write the result; looked at before anything is done.
     progress
         Called with the name of each stage.
+    tell
+        Called with the vessel of a log where it was not asked for.
 
     Raises
     ------
@@ -74,12 +78,17 @@ def export(
         _check_apart(json, [one for one in (file, mcap, diagnosis) if one is not None])
     if mcap is None:
         return export_model(what, str(to), out, file=file, overwrite=overwrite)
+    loaded = load(model, out) if model else None
+    own = parse_profile(loaded.profile_text, loaded.name) if loaded else None
+    choice = choose_vessel([what], vessel, own=own)
+    if choice.reason:
+        tell(choice.reason)
     return export_log(
         what,
         mcap,
         out,
-        profile=load_profile(vessel) if vessel else None,
-        model=load(model, out) if model else None,
+        profile=None if choice.profile is own else choice.profile,
+        model=loaded,
         diagnosis=diagnosis,
         overwrite=overwrite,
         progress=progress,

@@ -46,8 +46,7 @@ def patient(vessel: str | Path | Profile | None, model: str | None, out: Path) -
     if loaded is None:
         if not vessel:
             raise FerryIdError(
-                "diagnose: the log alone does not say whose it is, --vessel and --model are both left out. "
-                "Fix: give --vessel a bundled profile's name or a TOML file"
+                "diagnose: neither a vessel nor a model is given. Fix: give --vessel a profile's name or a TOML file"
             )
         return _profile(vessel), None
     own = parse_profile(loaded.profile_text, loaded.name)

@@ -31,7 +31,7 @@ from ferryid.signals.recording import log_name, make_recording, selected
 from ferryid.signals.render import render_inspect
 from ferryid.signals.thresholds import SIGNALS
 from ferryid.signals.track import LeftOut
-from ferryid.vessel.load import bundled, load_profile
+from ferryid.vessel.choice import named_profiles
 from ferryid.vessel.profile import Profile
 from ferryid.vessel.signal_map import Selection, select, survey
 
@@ -49,7 +49,7 @@ def inspect(path: str | Path, profile: Profile | None = None, *, verify: bool = 
     path
         Log in any supported format; parts of one recording joined by ``+``.
     profile
-        Vessel profile whose signals are looked for; without one all bundled profiles are tried.
+        Vessel profile whose signals are looked for; without one all profiles that have a name are tried.
     verify
         Read the whole log, check every checksum and hash every byte.
 
@@ -228,11 +228,10 @@ def _vessel(
 
 
 def _bundled_matches(path: str | Path, reader: Reader) -> list[dict[str, Any]]:
-    """How many of its signals every bundled profile finds in the log, best first, and whether a fit would take the log."""
+    """How many of its signals every profile with a name finds in the log, best first, and whether a fit would take the log."""
     is_table = any(topic.encoding == "table" for topic in reader.topics)
     matches = []
-    for name in bundled():
-        profile = load_profile(name)
+    for name, profile in named_profiles()[0].items():
         problem, usable = "", True
         try:
             # A table is named by the profile's own layout, so that it is opened the way the profile would.

@@ -1,8 +1,9 @@
 """The vessel: its profile, hull, thrusters and wind areas, and where its signals live in a log."""
 
+from ferryid.vessel.choice import VesselChoice, choose_vessel, stated_choice
 from ferryid.vessel.describe import describe
 from ferryid.vessel.faults import Fault
-from ferryid.vessel.load import bundled, check_profile, load_profile, parse_profile
+from ferryid.vessel.load import bundled, check_profile, known, load_profile, parse_profile
 from ferryid.vessel.resolve import SWAY_NOT_MEASURED, resolve, resolve_notes
 from ferryid.vessel.signal_map import Selection, convert, select, survey
 from ferryid.vessel.thrusters import actuator_columns, applied_force, speed_doubts
@@ -11,17 +12,21 @@ __all__ = [
     "SWAY_NOT_MEASURED",
     "Fault",
     "Selection",
+    "VesselChoice",
     "actuator_columns",
     "applied_force",
     "bundled",
     "check_profile",
+    "choose_vessel",
     "convert",
     "describe",
+    "known",
     "load_profile",
     "parse_profile",
     "resolve",
     "resolve_notes",
     "select",
     "speed_doubts",
+    "stated_choice",
     "survey",
 ]

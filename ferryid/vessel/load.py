@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import re
+import sys
 import tomllib
 from importlib import resources
 from pathlib import Path
@@ -27,13 +29,32 @@ def bundled() -> tuple[str, ...]:
     return tuple(sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".toml")))
 
 
+def user_folder() -> Path:
+    """Return the folder of the user's own profiles: ``ferryid/vessels`` in that of the system for configuration."""
+    base = os.environ.get("APPDATA" if sys.platform == "win32" else "XDG_CONFIG_HOME", "")
+    return (Path(base) if base else Path("~/.config").expanduser()) / "ferryid" / "vessels"
+
+
+def user_profiles() -> dict[str, Path]:
+    """Return the user's own profiles: the name of each file without its suffix, and its path."""
+    try:
+        return {path.stem: path for path in sorted(user_folder().glob("*.toml")) if path.is_file()}
+    except OSError:
+        return {}
+
+
+def known() -> tuple[str, ...]:
+    """Return the names of all profiles that have one: the user's own and the bundled ones."""
+    return tuple(sorted({*bundled(), *user_profiles()}))
+
+
 def load_profile(name_or_path: str | Path) -> Profile:
-    """Load a bundled profile by its name, or one from a TOML file.
+    """Load a profile by its name, the user's own before a bundled one, or from a TOML file.
 
     Raises
     ------
     FerryIdError
-        For a name that is not bundled, a file that cannot be read, and for the first fault in a profile, with its line
+        For a name that is not known, a file that cannot be read, and for the first fault in a profile, with its line
         and the number of other faults.
     """
     text, where = _source(name_or_path)
@@ -73,6 +94,9 @@ def check_profile(path: str | Path) -> list[Fault]:
 def _source(name_or_path: str | Path) -> tuple[str, str]:
     """Return a profile's text and the name under which messages show it."""
     name = str(name_or_path)
+    own = user_profiles().get(name)
+    if own is not None:
+        return _source(own)
     if name in bundled():
         resource = resources.files("ferryid.vessel.profiles").joinpath(f"{name}.toml")
         return resource.read_text(encoding="utf-8"), f"{name}.toml"
@@ -82,11 +106,11 @@ def _source(name_or_path: str | Path) -> tuple[str, str]:
             raise FerryIdError(
                 f"{name}: the vessel profile cannot be read, found "
                 f"{'a folder' if path.is_dir() else 'no such file'}. Fix: give the path of a TOML file, or one of "
-                f"{', '.join(bundled())}"
+                f"{', '.join(known())}"
             )
         raise FerryIdError(
-            f"{name}: no vessel profile of this name is bundled and no such file exists."
-            f"{did_you_mean(name, bundled())} Fix: give the path of a TOML file, or one of {', '.join(bundled())}"
+            f"{name}: no vessel profile of this name is bundled or in {user_folder()}, and no such file exists."
+            f"{did_you_mean(name, known())} Fix: give the path of a TOML file, or one of {', '.join(known())}"
         )
     try:
         return path.read_text(encoding="utf-8-sig"), name

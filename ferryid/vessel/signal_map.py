@@ -103,6 +103,25 @@ def survey(profile: Profile, topics: Sequence[Topic], losses: Sequence[Loss] = (
     return Selection({name: tuple(paths) for name, paths in wanted.items()}, found, missing, notes)
 
 
+def lacking_signals(profile: Profile, selection: Selection) -> list[Signal]:
+    """Return the signals without which a log cannot be used; feedback may be missing where the order is there."""
+    lacking = [
+        signal
+        for signal in profile.signals
+        if signal.required
+        and signal.quantity in selection.missing
+        and not _has_stand_in(profile, signal.quantity, selection.missing)
+    ]
+    lacking += [
+        signal
+        for signal in profile.signals
+        if signal.quantity in selection.missing
+        and signal not in lacking
+        and _leaves_actuator_dark(profile, signal.quantity, selection.missing)
+    ]
+    return lacking
+
+
 def select(profile: Profile, topics: Sequence[Topic], where: str, losses: Sequence[Loss] = ()) -> Selection:
     """Find the profile's signals in a log.
 
@@ -123,20 +142,7 @@ def select(profile: Profile, topics: Sequence[Topic], where: str, losses: Sequen
         For a required signal that the log does not have. Feedback may be missing where the order is there.
     """
     selection = survey(profile, topics, losses)
-    lacking = [
-        signal
-        for signal in profile.signals
-        if signal.required
-        and signal.quantity in selection.missing
-        and not _has_stand_in(profile, signal.quantity, selection.missing)
-    ]
-    lacking += [
-        signal
-        for signal in profile.signals
-        if signal.quantity in selection.missing
-        and signal not in lacking
-        and _leaves_actuator_dark(profile, signal.quantity, selection.missing)
-    ]
+    lacking = lacking_signals(profile, selection)
     if lacking:
         signal = lacking[0]
         others = len(lacking) - 1
