@@ -12,7 +12,7 @@ from ferryid.cli.output import emit, progress
 app = typer.Typer(
     help="Check, show and list vessel profiles.", no_args_is_help=True, rich_markup_mode=None, add_completion=False
 )
-File = Annotated[str, typer.Argument(help="Path of a profile (TOML), or the name of a bundled one.")]
+File = Annotated[str, typer.Argument(help="Path of a profile (TOML), or the name of one: see ferryid vessel list.")]
 
 
 @app.command()
@@ -51,7 +51,7 @@ def show(
 
 @app.command("list")
 def list_(json: Json = None) -> None:
-    """List the bundled profiles."""
+    """List the profiles that have a name: bundled, and your own in the folder for configuration."""
     from ferryid import api
 
     emit(api.vessels(), json)

@@ -95,11 +95,11 @@ def _chosen(logs: Sequence[str], vessel: str | Path | Profile | None, tell: Prog
 
 def _of_archive(out: Path, vessel: str | Path | Profile | None, tell: Progress) -> Profile:
     """Return the vessel whose ingested logs are used, and tell which one was found where it was not asked for."""
-    from ferryid.identify import archived_vessel
+    from ferryid.signals.ingested_vessel import ingested_vessel
 
     if vessel is not None:
         return _profile(vessel)
-    choice = archived_vessel(out)
+    choice = ingested_vessel(out)
     _told(choice, tell)
     return choice.profile
 
@@ -583,12 +583,13 @@ def simulate(
 
 def vessels() -> Outcome:
     """Return the vessel profiles that have a name: the bundled ones and those in the user's folder for configuration."""
-    from ferryid.vessel import known, load_profile
+    from ferryid.vessel.choice import named_profiles
 
-    profiles = [load_profile(name) for name in known()]
-    listed = [{"name": one.name, "title": one.title, "source": one.source} for one in profiles]
-    text = "\n".join(f"{one.name:<18} {one.title}" for one in profiles)
-    return _outcome({"schema": "ferryid.vessels/1", "vessels": listed}, text)
+    profiles, faulty = named_profiles()
+    listed = [{"name": name, "title": one.title, "source": one.source} for name, one in profiles.items()]
+    lines = [f"{name:<18} {one.title}" for name, one in profiles.items()]
+    lines += [f"{one.name:<18} {one.problem}" for one in faulty]
+    return _outcome({"schema": "ferryid.vessels/1", "vessels": listed}, "\n".join(lines))
 
 
 def check_vessel(file: str | Path, *, identifiable: bool = False, progress: Progress = _quiet) -> Outcome:

@@ -2,7 +2,6 @@
 
 from ferryid.identify.acceptance import Acceptance, accept, accept_on_motions, force_mse
 from ferryid.identify.archive import fit_archive
-from ferryid.identify.archived_logs import archived_vessel
 from ferryid.identify.block_sum_store import load_block_sums
 from ferryid.identify.model_selection import Selection
 from ferryid.identify.outcome import ComponentCurve, Excitation, FitOutcome, LogFit
@@ -24,7 +23,6 @@ __all__ = [
     "Selection",
     "accept",
     "accept_on_motions",
-    "archived_vessel",
     "check_window",
     "fit_archive",
     "fit_logs",

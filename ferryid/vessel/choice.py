@@ -126,7 +126,7 @@ def stated_choice(logs: Sequence[str], *, environment: bool = True) -> VesselCho
         if named is not None and named[0] not in [choice.reference for choice, _ in found.values()]:
             reference, file = named
             profile = load_profile(reference)
-            how = f"it is {file}" if reference == file else f"{file} states it"
+            how = f"from {file}" if reference == file else f"stated in {file}"
             found.setdefault(profile.sha256, (VesselChoice(profile, reference, _line(profile, how)), log))
     if len(found) > 1:
         (first, a), (second, b), *_ = found.values()
@@ -143,7 +143,7 @@ def stated_choice(logs: Sequence[str], *, environment: bool = True) -> VesselCho
         profile = load_profile(named_by_environment)
     except FerryIdError as error:
         raise FerryIdError(f"${VARIABLE}: {error}") from error
-    return VesselChoice(profile, named_by_environment, _line(profile, f"${VARIABLE} states it"))
+    return VesselChoice(profile, named_by_environment, _line(profile, f"stated in ${VARIABLE}"))
 
 
 def _line(profile: Profile, why: str) -> str:
@@ -169,9 +169,9 @@ def _fitting(logs: Sequence[str]) -> VesselChoice:
     shared = [name for name in profiles if all(name in names for names in fitting)]
     if len(shared) == 1:
         profile = profiles[shared[0]]
-        kind = "your own or bundled" if user_profiles() else "bundled"
+        kind = "your own" if shared[0] in user_profiles() else "bundled"
         what = "this log has" if len(logs) == 1 else "these logs have"
-        return VesselChoice(profile, shared[0], _line(profile, f"the one profile, {kind}, whose signals {what}"))
+        return VesselChoice(profile, shared[0], _line(profile, f"{kind}, the only profile whose signals {what}"))
     for (log, matches), names in zip(every, fitting, strict=True):
         if not names:
             raise FerryIdError(_none_fits(log, matches))

@@ -26,6 +26,7 @@ from ferryid.batch.spread import spread
 from ferryid.errors import FerryIdError, UnwritableError
 from ferryid.files import dump_json, unwritable
 from ferryid.report.batch_rows import BatchResult
+from ferryid.vessel import load_profile
 from tests.batch.archive import archive, deadly, recipe, rows_of, run, same
 from tests.batch.work import children_of, default_interrupts, ended, environment
 
@@ -522,12 +523,24 @@ def test_a_name_of_bytes_that_are_no_characters(tmp_path: Path) -> None:
     assert again.counts["done_before"] == 2
 
 
-def test_nothing_says_whose_log_it_is(tmp_path: Path) -> None:
-    logs = archive(tmp_path, 1)
+def test_vessels_are_found_for_each_log(tmp_path: Path) -> None:
+    logs = archive(tmp_path, 2)
     recipe(tmp_path)
-    with pytest.raises(FerryIdError, match=r"no vessel is given for the log .* Fix: give --vessel"):
-        run(tmp_path, logs / "*.mcap", vessel=None)
-    assert not results(tmp_path).exists()
+    (logs / "odd.csv").write_text("t,a\n" + "".join(f"{k},1\n" for k in range(50)), encoding="utf-8")
+    other = logs / "other"
+    other.mkdir()
+    (logs / "day1.mcap").rename(other / "day1.mcap")
+    (other / "vessel.toml").write_text(load_profile("milliampere").text.replace('"milliampere"', '"twin"', 1), "utf-8")
+    result, told = run(tmp_path, logs / "**" / "*.[mc]*", vessel=None)
+    assert [(row.name, row.vessel, row.status) for row in result.rows] == [
+        ("day0", "milliampere", "done"),
+        ("odd", "", "refused"),
+        ("day1", "twin", "done"),
+    ]
+    assert "no vessel profile fits this log" in result.rows[1].reason
+    assert f"1 log of vessel twin: from {other / 'vessel.toml'}" in told
+    again, told = run(tmp_path, logs / "**" / "*.[mc]*", vessel=None)
+    assert again.counts["done_before"] == 3
 
 
 def test_time_left_by_bytes_and_by_count() -> None:

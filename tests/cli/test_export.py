@@ -92,7 +92,6 @@ def test_a_log_for_a_viewer(ferryid, fixtures: Path, out: Path, tmp_path: Path) 
         (("milliampere", "--diagnosis", "d.json"), "--diagnosis: is for a log"),
         (("short.mcap", "--mcap", "v.mcap", "--to", "c"), "--to: is for a model"),
         (("short.mcap", "--mcap", "v.mcap", "--file", "v.h"), "--file: is for a model"),
-        (("short.mcap", "--mcap", "v.mcap"), "give --model or --vessel"),
         (("missing.mcap", "--mcap", "v.mcap", "--vessel", "milliampere"), "missing.mcap"),
         (("milliampere", "--to", "matlab", "--file", "my-boat.m"), "my-boat.m"),
         (("milliampere", "--to", "c", "--file", "x.json", "--json", "x.json"), "two files"),

@@ -1,0 +1,97 @@
+"""Options whose defaults are in a ``ferryid.toml`` beside the logs, and commands without ``--vessel``."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from ferryid.vessel.choice import VARIABLE
+
+
+@pytest.fixture(autouse=True)
+def alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No profile of the user's own."""
+    monkeypatch.delenv(VARIABLE, raising=False)
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+
+
+@pytest.fixture
+def log(tmp_path: Path, fixtures: Path) -> Path:
+    """Give a log in a folder of its own."""
+    (tmp_path / "day").mkdir()
+    return Path(shutil.copy(fixtures / "short.mcap", tmp_path / "day" / "a.mcap"))
+
+
+def put(log: Path, text: str) -> None:
+    (log.parent / "ferryid.toml").write_text(text, encoding="utf-8")
+
+
+def test_without_vessel_the_choice_is_one_line_beside_the_result(ferryid, log: Path, tmp_path: Path) -> None:
+    run = ferryid("ingest", log, "--out", tmp_path / "out", "--json", "-")
+    assert run.code == 0
+    assert json.loads(run.out)["profile"] == "milliampere"
+    assert run.err == "vessel milliampere: bundled, the only profile whose signals this log has\n"
+    assert ferryid("ingest", log, "--vessel", "milliampere", "--out", tmp_path / "out").err == ""
+
+
+def test_defaults_of_all_commands_and_of_one(ferryid, log: Path) -> None:
+    put(log, 'out = "results"\nverify = true\n[ingest]\njson = "found.json"\n[fit]\ndelta = 0.4\n')
+    assert ferryid("ingest", log).code == 0
+    found = json.loads((log.parent / "found.json").read_text(encoding="utf-8"))
+    assert Path(found["logs"][0]["folder"]).is_relative_to(log.parent / "results")
+
+
+def test_the_command_line_counts_before_a_file(ferryid, log: Path, tmp_path: Path) -> None:
+    put(log, 'out = "results"\n')
+    assert ferryid("ingest", log, "--out", tmp_path / "here").code == 0
+    assert (tmp_path / "here" / "logs").is_dir()
+    assert not (log.parent / "results").exists()
+
+
+def test_repeated_options_and_switches(ferryid, log: Path) -> None:
+    put(log, '[diagnose]\nwithhold = ["wind", "wave"]\neach = true\n')
+    run = ferryid("diagnose", log)
+    assert run.code == 2
+    assert '"wave" is not a signal that can be withheld' in run.err
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("sigmo = 1\n", 'ferryid.toml:1: "sigmo" is no option of any command. Did you mean "sigma"? Fix:'),
+        ("[ingest]\nsigma = 1\n", 'ferryid.toml:2: "sigma" is no option of ferryid ingest.'),
+        ("[ingst]\n", 'ferryid.toml:1: there is no command "ingst". Did you mean "ingest"?'),
+        ("[ingest]\nverify = 3\n", "ferryid.toml:2: --verify takes true or false, found 3. Fix:"),
+        ("out = true\n", "ferryid.toml:1: --out takes a text or number, found True. Fix:"),
+        ('[ingest]\nvessel = "milliampere"\n', "ferryid.toml:2: the vessel is of the logs"),
+        ("out = \n", "ferryid.toml: the defaults for options cannot be read"),
+    ],
+)
+def test_a_file_with_a_fault(ferryid, log: Path, text: str, told: str) -> None:
+    put(log, text)
+    run = ferryid("ingest", log)
+    assert run.code == 2
+    assert told in run.err
+    assert len(run.err.splitlines()) == 1
+    assert not (log.parent / "ferryid-out").exists()
+
+
+def test_a_value_that_an_option_cannot_take(ferryid, log: Path) -> None:
+    put(log, '[fit]\ndelta = "much"\n')
+    run = ferryid("fit", log)
+    assert run.code == 2
+    assert "ferryid.toml:2: " in run.err
+    assert "--delta" in run.err
+
+
+def test_the_archive_finds_its_vessel(ferryid, log: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    run = ferryid("fit", "--archive", "--out", out)
+    assert run.code == 2
+    assert "the ingested logs do not decide the vessel, found none" in run.err
+    assert ferryid("ingest", log, "--out", out).code == 0
+    run = ferryid("sweep", "components", "--archive", "--out", out)
+    assert run.err.startswith(f"vessel milliampere: the one that was ingested to {out}\n")
