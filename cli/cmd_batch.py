@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ferryid.cli.options import OUT, Json, Out, Vessel
+from ferryid.cli.options import OUT, From, Json, Out, To, Vessel, ranges
 from ferryid.cli.output import emit, progress, tell
 
 
@@ -24,6 +24,8 @@ def command(
         typer.Option(help="TOML file: which steps, with which settings; all with their defaults if left out."),
     ] = None,
     vessel: Vessel = None,
+    from_: From = None,
+    to: To = None,
     processes: Annotated[int, typer.Option(help="Processes to share the logs among.")] = 2,
     dask: Annotated[
         str | None,
@@ -41,7 +43,7 @@ def command(
 
     outcome = api.batch(
         logs, out, vessel=vessel or None, recipe=recipe, processes=processes, dask=dask, memory_limit=memory, again=again,
-        progress=progress, tell=tell,
+        ranges=ranges(from_, to), progress=progress, tell=tell,
     )  # fmt: skip
     emit(outcome, json)
     counts = outcome.json["counts"]

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ferryid.cli.options import OUT, Json, ModelVessel, Out
+from ferryid.cli.options import OUT, From, Json, ModelVessel, Out, To, ranges
 from ferryid.cli.output import emit, progress, tell
 from ferryid.cli.several import several_after
 
@@ -23,6 +23,8 @@ def command(
         ),
     ] = None,
     vessel: ModelVessel = None,
+    from_: From = None,
+    to: To = None,
     window: Annotated[float, typer.Option(help="Smoothing window [s] of the test data, the same for all.")] = 1.0,
     out: Out = OUT,
     json: Json = None,
@@ -37,6 +39,14 @@ def command(
 
     words = ("ferryid", *sys.argv[1:])
     outcome = api.compare(
-        models, on or (), out, vessel=vessel or None, window_s=window, command=words, progress=progress, tell=tell
+        models,
+        on or (),
+        out,
+        vessel=vessel or None,
+        window_s=window,
+        command=words,
+        progress=progress,
+        ranges=ranges(from_, to),
+        tell=tell,
     )
     emit(outcome, json)

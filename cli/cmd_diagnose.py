@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ferryid.cli.options import OUT, Json, Logs, Out, Verify, Vessel
+from ferryid.cli.options import OUT, From, Json, Logs, Out, To, Verify, Vessel, ranges
 from ferryid.cli.output import emit, progress, tell
 from ferryid.cli.several import several_after
 
@@ -17,6 +17,8 @@ Command = several_after("--versus", "--reference")
 def command(
     logs: Logs,
     vessel: Vessel = None,
+    from_: From = None,
+    to: To = None,
     model: Annotated[
         str | None, typer.Option(help="Model to examine: path, name or name@version; the profile's hull if left out.")
     ] = None,
@@ -63,11 +65,12 @@ def command(
     settings = DiagnosisSettings(
         None, against, each and not together, tuple(withhold or ()), tuple(reference or ()), setting
     )
+    used = ranges(from_, to)
     words = ("ferryid", *sys.argv[1:])
     if versus:
         outcome = api.compare_groups(
             logs, versus, vessel or None, out, model=model, settings=settings, name=name, command=words, verify=verify,
-            progress=progress, tell=tell,
+            ranges=used, progress=progress, tell=tell,
         )  # fmt: skip
         emit(outcome, json)
         return
@@ -80,6 +83,7 @@ def command(
         name=name,
         command=words,
         verify=verify,
+        ranges=used,
         progress=progress,
         tell=tell,
     )

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from ferryid.cli.options import OUT, Json, Logs, ModelVessel, Out
+from ferryid.cli.options import OUT, From, Json, Logs, ModelVessel, Out, To, ranges
 from ferryid.cli.output import emit, progress, tell
 
 
@@ -14,6 +14,8 @@ def command(
     model: Annotated[str, typer.Argument(help="Path of a model file, name, or name@version.")],
     logs: Logs,
     vessel: ModelVessel = None,
+    from_: From = None,
+    to: To = None,
     window: Annotated[
         float | None, typer.Option(help="Smoothing window [s] of the test data; the model's own if left out.")
     ] = None,
@@ -23,5 +25,7 @@ def command(
     """Judge a model on other logs: force MSE and R² per axis, free-run error."""
     from ferryid import api
 
-    outcome = api.evaluate(model, logs, out, vessel=vessel or None, window_s=window, progress=progress, tell=tell)
+    outcome = api.evaluate(
+        model, logs, out, vessel=vessel or None, window_s=window, ranges=ranges(from_, to), progress=progress, tell=tell
+    )
     emit(outcome, json)

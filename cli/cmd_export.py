@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ferryid.cli.options import OUT, Json, Out, Vessel
+from ferryid.cli.options import OUT, From, Json, Out, Vessel, ranges
 from ferryid.cli.output import emit, progress, tell
 from ferryid.export.formats import names
 
@@ -16,11 +16,14 @@ def command(
     what: Annotated[
         str, typer.Argument(metavar="MODEL|LOG", help="Path, name or name@version of a model; with --mcap a log.")
     ],
-    to: Annotated[str | None, typer.Option(help=f"Form of a model: {', '.join(names())}.")] = None,
+    to: Annotated[
+        str | None, typer.Option(help=f"Form of a model: {', '.join(names())}; with --mcap the end of the range.")
+    ] = None,
     file: Annotated[Path | None, typer.Option(help="File for a model; one in exports/ of --out if left out.")] = None,
     mcap: Annotated[Path | None, typer.Option(help="MCAP file for a log: its forces, motion and findings.")] = None,
     model: Annotated[str | None, typer.Option(help="With --mcap: the model to compare with the log.")] = None,
     vessel: Vessel = None,
+    from_: From = None,
     diagnosis: Annotated[Path | None, typer.Option(help="With --mcap: JSON of ferryid diagnose on this log.")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an export that is there.")] = False,
     out: Out = OUT,
@@ -30,9 +33,11 @@ def command(
     from ferryid import api
     from ferryid.export.commands import notes
 
+    used = ranges(from_, None if mcap is None else to)
     outcome = api.export(
-        what, out, to=to, file=file, mcap=mcap, model=model, vessel=vessel or None, diagnosis=diagnosis, overwrite=overwrite,
-        json=None if json in (None, "-") else Path(json), progress=progress, tell=tell,
+        what, out, to=to if mcap is None else None, file=file, mcap=mcap, model=model, vessel=vessel or None,
+        diagnosis=diagnosis, overwrite=overwrite, json=None if json in (None, "-") else Path(json), ranges=used,
+        progress=progress, tell=tell,
     )  # fmt: skip
     for note in notes(outcome.json):
         tell(f"ferryid: {note}")

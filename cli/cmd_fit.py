@@ -12,6 +12,7 @@ from ferryid.cli.options import (
     Basis,
     Delta,
     Estimator,
+    From,
     Inertia,
     Json,
     MaybeLogs,
@@ -21,11 +22,13 @@ from ferryid.cli.options import (
     Sigma,
     Smoother,
     Structure,
+    To,
     Verify,
     Vessel,
     WeakWindow,
     Zeta,
     given,
+    ranges,
 )
 from ferryid.cli.output import emit, progress, tell
 
@@ -33,6 +36,8 @@ from ferryid.cli.output import emit, progress, tell
 def command(
     logs: MaybeLogs = None,
     vessel: Vessel = None,
+    from_: From = None,
+    to: To = None,
     name: Annotated[str, typer.Option(help="Name of the model in the store; the vessel's if left out.")] = "",
     basis: Basis = "modulus",
     structure: Structure = "decoupled",
@@ -78,7 +83,16 @@ def command(
     )  # fmt: skip
     chosen = logs or () if archive else given(logs)
     outcome = api.fit(
-        chosen, vessel or None, settings, out, name=name, archive=archive, verify=verify, progress=progress, tell=tell
+        chosen,
+        vessel or None,
+        settings,
+        out,
+        name=name,
+        archive=archive,
+        verify=verify,
+        ranges=ranges(from_, to),
+        progress=progress,
+        tell=tell,
     )
     emit(outcome, json)
     if require_accept and not outcome.accepted:

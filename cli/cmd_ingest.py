@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
-from ferryid.cli.options import OUT, Json, Logs, Out, Verify, Vessel
+from ferryid.cli.options import OUT, From, Json, Logs, Out, To, Verify, Vessel, ranges
 from ferryid.cli.output import emit, progress, tell
 
 
-def command(logs: Logs, vessel: Vessel = None, out: Out = OUT, verify: Verify = False, json: Json = None) -> None:
+def command(
+    logs: Logs,
+    vessel: Vessel = None,
+    from_: From = None,
+    to: To = None,
+    out: Out = OUT,
+    verify: Verify = False,
+    json: Json = None,
+) -> None:
     """Read logs into Parquet tables with SNAME column names, SI units and provenance."""
     from ferryid import api
 
-    emit(api.ingest(logs, vessel or None, out, verify=verify, progress=progress, tell=tell), json)
+    emit(
+        api.ingest(logs, vessel or None, out, verify=verify, ranges=ranges(from_, to), progress=progress, tell=tell),
+        json,
+    )

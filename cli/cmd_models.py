@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ferryid.cli.options import OUT, Json, ModelVessel, Out
+from ferryid.cli.options import OUT, From, Json, ModelVessel, Out, ranges
 from ferryid.cli.output import emit, progress, tell
 from ferryid.errors import FerryIdError
 
@@ -26,8 +26,14 @@ def command(
         ),
     ] = None,
     vessel: ModelVessel = None,
+    from_: From = None,
     force: Annotated[bool, typer.Option("--force", help="Promote although the replay found it worse.")] = False,
-    to: Annotated[int | None, typer.Option(help="Version to roll back to; the one before if left out.")] = None,
+    to: Annotated[
+        str | None,
+        typer.Option(
+            help="Of rollback: the version to return to, the one before if left out. Of promote: the end of the range."
+        ),
+    ] = None,
     out: Out = OUT,
     json: Json = None,
 ) -> None:
@@ -37,7 +43,14 @@ def command(
     first, *others = words or [""]
     if first == "promote" and others:
         promoted = api.promote(
-            others[0], others[1:], out, vessel=vessel or None, force=force, progress=progress, tell=tell
+            others[0],
+            others[1:],
+            out,
+            vessel=vessel or None,
+            ranges=ranges(from_, to),
+            force=force,
+            progress=progress,
+            tell=tell,
         )
         emit(promoted, json)
         if not promoted.json["promoted"]:
@@ -52,7 +65,7 @@ def command(
         emit(api.show_model(first, out) if first else api.models(out), json)
 
 
-def _rolled_back(names: list[str], out: Path, to: int | None) -> Outcome:
+def _rolled_back(names: list[str], out: Path, to: str | None) -> Outcome:
     from ferryid import api
 
     if len(names) > 1:
@@ -60,4 +73,7 @@ def _rolled_back(names: list[str], out: Path, to: int | None) -> Outcome:
     name, _, version = names[0].partition("@")
     if version and not version.isdigit():
         raise FerryIdError(f"models rollback: {names[0]} has no version. Fix: write {name}@NUMBER, or {name} alone")
-    return api.roll_back(name, out, to=int(version) if version else to)
+    if to is not None and not to.isdigit():
+        raise FerryIdError(f"models rollback: --to {to} is no version. Fix: give its number")
+    wanted = version or to
+    return api.roll_back(name, out, to=int(wanted) if wanted else None)

@@ -10,6 +10,7 @@ from ferryid.cli.options import (
     OUT,
     Basis,
     Delta,
+    From,
     Inertia,
     Json,
     MaybeLogs,
@@ -19,10 +20,12 @@ from ferryid.cli.options import (
     Sigma,
     Smoother,
     Structure,
+    To,
     Vessel,
     WeakWindow,
     Zeta,
     given,
+    ranges,
 )
 from ferryid.cli.output import emit, progress, tell
 
@@ -31,6 +34,8 @@ def command(
     what: Annotated[str, typer.Argument(help="components, window, both at once, or basis.")],
     logs: MaybeLogs = None,
     vessel: Vessel = None,
+    from_: From = None,
+    to: To = None,
     windows: Annotated[str, typer.Option(help="Windows to try [s], as 0.5,1,2; a usual range if left out.")] = "",
     window: Annotated[float, typer.Option(help="Smoothing window [s] for sweeps of components or basis.")] = 1.0,
     components: Annotated[
@@ -77,6 +82,7 @@ def command(
         windows_s=parse_windows(windows),
         folds=folds,
         archive=archive,
+        ranges=ranges(from_, to),
         progress=progress,
         tell=tell,
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -37,6 +38,15 @@ Json = Annotated[
     str | None, typer.Option("--json", help="Write the result as JSON to this file, - for standard output.")
 ]
 Verify = Annotated[bool, typer.Option("--verify", help="Read the whole file and check every checksum.")]
+From = Annotated[
+    str | None,
+    typer.Option(
+        "--from",
+        help="Use every log from here on: seconds from its start, from its end if negative, or a clock time in UTC; several "
+        "ranges with commas.",
+    ),
+]
+To = Annotated[str | None, typer.Option("--to", help="Use every log up to here: as --from.")]
 Basis = Annotated[str, typer.Option("--basis", help=f"Basis functions: {', '.join(basis_names())}.")]
 Structure = Annotated[
     str, typer.Option("--structure", help="coupled: every term in every axis; decoupled: each where physics has it.")
@@ -79,6 +89,15 @@ Sigma = Annotated[float, typer.Option("--sigma", help="Factor on the base model'
 Zeta = Annotated[float, typer.Option("--zeta", help="Factor on the base model's force.")]
 
 OUT = Path("ferryid-out")
+
+
+def ranges(first: str | None, last: str | None) -> Sequence[tuple[str | float | None, str | float | None]]:
+    """Return the ranges of ``--from`` and ``--to``."""
+    if first is None and last is None:
+        return ()
+    from ferryid.signals.time_ranges import parse_ranges
+
+    return parse_ranges(first, last)
 
 
 def given(logs: list[str] | None) -> list[str]:

@@ -58,6 +58,9 @@ OUT = Path("ferryid-out")
 
 Logs = str | Path | Sequence[str | Path]
 """Bags, MCAP files, tables or folders; parts of one recording joined by ``+``."""
+Ranges = Sequence[tuple[str | float | None, str | float | None]]
+"""First and last time of what is used of every log: seconds from its start, negative ones from its end, or clock times in UTC
+(``"14:30:05"``, ``"2024-05-17T14:30:05"``), None for the start or the end; all of a log where there is none."""
 Progress = Callable[[str], None]
 """Called with the name of each stage, and with an empty one at the end."""
 
@@ -123,10 +126,21 @@ def _model(model: str | Path | Model, out: Path) -> Model:
     return model if isinstance(model, Model) else load(str(model), out)
 
 
-def _context(out: str | Path, progress: Progress, verify: bool = False) -> RunContext:
+def _context(out: str | Path, progress: Progress, verify: bool = False, ranges: Ranges = ()) -> RunContext:
     from ferryid.types import RunContext
 
-    return RunContext(Path(out), progress, verify)
+    return RunContext(Path(out), progress, verify, ranges=tuple(ranges))
+
+
+def _refuse_ranges_of_archive(ranges: Ranges) -> None:
+    """Refuse ranges of what is kept as sums."""
+    from ferryid.errors import FerryIdError
+
+    if ranges:
+        raise FerryIdError(
+            "--archive: what is kept of ingested logs is of all of each, so that no range of it can be used. Fix: leave out "
+            "--from and --to, give them to ferryid ingest, or name the logs without --archive"
+        )
 
 
 def _outcome(result: Mapping[str, Any], text: str) -> Outcome:
@@ -141,6 +155,7 @@ def inspect(
     *,
     verify: bool = False,
     width: int = 160,
+    ranges: Ranges = (),
     tell: Progress = _quiet,
 ) -> Outcome:
     """Return topics, types, counts, rates, gaps and clocks of a log, and the signals that a vessel's profile finds in it.
@@ -163,8 +178,11 @@ def inspect(
     from ferryid.signals.inspect import render_inspect
     from ferryid.vessel import stated_choice
 
-    profile = _profile(vessel) if vessel is not None else _told(stated_choice([str(log)]), tell)
-    result = inspect_log(str(log), profile, verify=verify)
+    if vessel is not None or ranges:
+        profile: Profile | None = _chosen([str(log)], vessel, tell)
+    else:
+        profile = _told(stated_choice([str(log)]), tell)
+    result = inspect_log(str(log), profile, verify=verify, ranges=tuple(ranges))
     return _outcome(result, render_inspect(result, width))
 
 
@@ -175,6 +193,7 @@ def ingest(
     *,
     verify: bool = False,
     progress: Progress = _quiet,
+    ranges: Ranges = (),
     tell: Progress = _quiet,
 ) -> Outcome:
     """Read logs into Parquet tables with SNAME column names, SI units and provenance."""
@@ -182,7 +201,9 @@ def ingest(
     from ferryid.signals.ingest import render_ingest
 
     paths = _paths(logs)
-    result = ingest_logs(paths, _chosen(paths, vessel, tell), Path(out), verify=verify, progress=progress)
+    result = ingest_logs(
+        paths, _chosen(paths, vessel, tell), Path(out), verify=verify, ranges=tuple(ranges), progress=progress
+    )
     return _outcome(result, render_ingest(result))
 
 
@@ -196,6 +217,7 @@ def fit(
     archive: bool = False,
     verify: bool = False,
     progress: Progress = _quiet,
+    ranges: Ranges = (),
     tell: Progress = _quiet,
 ) -> FitReport:
     """Fit a model to logs, validate it, store it and write its report.
@@ -223,8 +245,9 @@ def fit(
     from ferryid.identify import FitSettings
     from ferryid.report.fit_report import fit_and_report, fit_archive_and_report
 
-    settings, run, paths = settings or FitSettings(), _context(out, progress, verify), _paths(logs)
+    settings, run, paths = settings or FitSettings(), _context(out, progress, verify, ranges), _paths(logs)
     if archive:
+        _refuse_ranges_of_archive(ranges)
         return fit_archive_and_report(_of_archive(run.out, vessel, tell), settings, run, paths, name=name)
     return fit_and_report(paths, _chosen(paths, vessel, tell), settings, run, name=name)
 
@@ -237,6 +260,7 @@ def evaluate(
     vessel: str | Path | Profile | None = None,
     window_s: float | None = None,
     progress: Progress = _quiet,
+    ranges: Ranges = (),
     tell: Progress = _quiet,
 ) -> Outcome:
     """Judge a model on other logs: mean square of the force errors and R² per axis, errors of free runs.
@@ -247,7 +271,7 @@ def evaluate(
     from ferryid.compare import evaluate as evaluate_model
     from ferryid.report.evaluation_text import render_evaluation
 
-    run, judged, paths = _context(out, progress), _model(model, Path(out)), _paths(logs)
+    run, judged, paths = _context(out, progress, ranges=ranges), _model(model, Path(out)), _paths(logs)
     profile = _for_model(judged, paths, vessel, tell)
     result = evaluate_model(judged, paths, run, profile=profile, window_s=window_s)
     return _outcome(result, render_evaluation(result))
@@ -262,6 +286,7 @@ def compare(
     window_s: float = 1.0,
     command: Sequence[str] = (),
     progress: Progress = _quiet,
+    ranges: Ranges = (),
     tell: Progress = _quiet,
 ) -> Report:
     """Compare models on the same rows of logs, and by their coefficients; without logs by their coefficients alone.
@@ -286,7 +311,7 @@ def compare(
     from ferryid.models.store import load
     from ferryid.report.comparison_report import report
 
-    run, paths = _context(out, progress), _paths(on)
+    run, paths = _context(out, progress, ranges=ranges), _paths(on)
     loaded = [load(name, run.out) for name in models]
     profile = None if vessel is None else _profile(vessel)
     if profile is None and loaded and paths:
@@ -310,6 +335,7 @@ def sweep(
     folds: int | None = None,
     archive: bool = False,
     progress: Progress = _quiet,
+    ranges: Ranges = (),
     tell: Progress = _quiet,
 ) -> Report:
     """Cross-validate component counts, smoothing windows [s], or bases and structures, and mark which to fit with."""
@@ -318,8 +344,10 @@ def sweep(
     from ferryid.report.sweep_report import sweep_and_report
 
     paths = _paths(logs)
+    if archive:
+        _refuse_ranges_of_archive(ranges)
     profile = _of_archive(Path(out), vessel, tell) if archive else _chosen(paths, vessel, tell)
-    arguments = (paths, profile, settings or FitSettings(), _context(out, progress))
+    arguments = (paths, profile, settings or FitSettings(), _context(out, progress, ranges=ranges))
     given = {"windows_s": windows_s, "folds": FOLDS if folds is None else folds, "archive": archive}
     if what == "basis":
         return structures_and_report(*arguments, **given)  # type: ignore[arg-type]
@@ -337,6 +365,7 @@ def diagnose(
     command: Sequence[str] = (),
     verify: bool = False,
     progress: Progress = _quiet,
+    ranges: Ranges = (),
     tell: Progress = _quiet,
 ) -> Report:
     """Say which physics a model left out of recordings, what shows it, and store the model that has it.
@@ -365,7 +394,7 @@ def diagnose(
 
     paths = _paths(logs)
     profile, examined = _examined(paths, vessel, model, out, settings, tell)
-    run = _context(out, progress, verify)
+    run = _context(out, progress, verify, ranges)
     outcome = diagnose_and_report(paths, profile, examined, run, name=name, command=command)
     progress("")
     return outcome
@@ -383,6 +412,7 @@ def compare_groups(
     command: Sequence[str] = (),
     verify: bool = False,
     progress: Progress = _quiet,
+    ranges: Ranges = (),
     tell: Progress = _quiet,
 ) -> Report:
     """Estimate in which properties and loads two groups of recordings of one vessel differ: ``diagnose LOGS --versus VERSUS``.
@@ -402,7 +432,7 @@ def compare_groups(
 
     paths, others = _paths(logs), _paths(versus)
     profile, examined = _examined([*paths, *others], vessel, model, out, settings, tell)
-    run = _context(out, progress, verify)
+    run = _context(out, progress, verify, ranges)
     outcome = compare_and_report(paths, others, profile, examined, run, name=name, command=command)
     progress("")
     return outcome
@@ -439,6 +469,7 @@ def batch(
     memory_limit: str = "4G",
     again: bool = False,
     progress: Progress = _quiet,
+    ranges: Ranges = (),
     tell: Progress = _quiet,
 ) -> Outcome:
     """Fit, evaluate and diagnose every log of an archive; what is done stays done. See `ferryid.batch.run.batch`."""
@@ -447,7 +478,7 @@ def batch(
 
     result = run_batch(
         _paths(logs), Path(out), vessel=vessel, recipe=recipe, processes=processes, dask=dask, memory_limit=memory_limit,
-        again=again, progress=progress, tell=tell,
+        again=again, ranges=tuple(ranges), progress=progress, tell=tell,
     )  # fmt: skip
     return _outcome(result.to_json(), render_batch(result))
 
@@ -465,6 +496,7 @@ def export(
     overwrite: bool = False,
     json: Path | None = None,
     progress: Progress = _quiet,
+    ranges: Ranges = (),
     tell: Progress = _quiet,
 ) -> Outcome:
     """Write a model as code or parameters for other programs, or with `mcap` a log and its forces for a viewer.
@@ -476,7 +508,7 @@ def export(
 
     result = write_export(
         str(what), Path(out), to=to, file=file, mcap=mcap, model=model, vessel=vessel, diagnosis=diagnosis,
-        overwrite=overwrite, json=json, progress=progress, tell=tell,
+        overwrite=overwrite, json=json, ranges=tuple(ranges), progress=progress, tell=tell,
     )  # fmt: skip
     progress("")
     return _outcome(result, render_export(result))
@@ -508,6 +540,7 @@ def promote(
     vessel: str | Path | Profile | None = None,
     force: bool = False,
     progress: Progress = _quiet,
+    ranges: Ranges = (),
     tell: Progress = _quiet,
 ) -> Outcome:
     """Make a stored version the current one, after a replay of it and of the present one on logs; ``json["promoted"]`` tells.
@@ -528,7 +561,7 @@ def promote(
     """
     from ferryid.report.promotion import promote_version
 
-    run = _context(out, progress)
+    run = _context(out, progress, ranges=ranges)
     paths, profile = _paths(on), None if vessel is None else _profile(vessel)
     if profile is None and paths and "@" in model:
         profile = _for_model(_model(model, run.out), paths, None, tell)

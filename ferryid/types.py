@@ -20,6 +20,12 @@ AXES = ("surge", "sway", "yaw")
 """The three degrees of freedom of motion in the horizontal plane, in the order of every array over axes."""
 
 
+TimeRange = tuple[str | float | None, str | float | None]
+"""First and last time that are used of a log, each in seconds from its start, negative from its end, or as a clock time."""
+TimeRanges = tuple[TimeRange, ...]
+"""Several of them; none for all of a log."""
+
+
 def no_progress(_stage: str) -> None:
     """Show no progress."""
 
@@ -40,6 +46,8 @@ class RunContext:
         Output folder whose ``logs`` keep the ingested tables, where that is another than `out`.
     keep_tables
         False reads the logs without keeping ingested tables.
+    ranges
+        What is used of every log; all of it where empty.
     """
 
     out: Path
@@ -47,6 +55,7 @@ class RunContext:
     verify: bool = False
     tables_out: Path | None = None
     keep_tables: bool = True
+    ranges: TimeRanges = ()
 
     @property
     def tables(self) -> Path | None:

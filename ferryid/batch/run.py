@@ -38,6 +38,8 @@ from ferryid.report.batch_page import render
 from ferryid.report.batch_rows import BatchResult, MemoryUse
 from ferryid.report.diagnosis_report import patient
 from ferryid.signals.recording import log_name
+from ferryid.signals.time_ranges import as_text
+from ferryid.types import TimeRanges
 from ferryid.vessel import choose_vessel
 from ferryid.vessel.profile import Profile
 
@@ -58,6 +60,7 @@ def batch(
     dask: str | None = None,
     memory_limit: str = "4G",
     again: bool = False,
+    ranges: TimeRanges = (),
     progress: Callable[[str], None],
     tell: Callable[[str], None],
 ) -> BatchResult:
@@ -79,6 +82,8 @@ def batch(
         Most memory of one process, like ``4G``.
     again
         Try again what went wrong before, though nothing has changed.
+    ranges
+        What is used of every log; all of it where empty.
     progress
         Called with what is done, what is at work and the time left.
     tell
@@ -101,7 +106,9 @@ def batch(
     with alone(folder, wait=False):
         remove_abandoned(out / "logs")
         kept = Kept(folder / "results")
-        tasks = [_task(entry, patients.get(entry.vessel), chosen, limit, again, out.resolve()) for entry in entries]
+        tasks = [
+            _task(entry, patients.get(entry.vessel), chosen, limit, again, out.resolve(), ranges) for entry in entries
+        ]
         rows: dict[int, tuple[Path, LogResult]] = {}
         for number, (entry, task) in enumerate(zip(entries, tasks, strict=True)):
             table = None if entry.problem else patients[entry.vessel][0].table
@@ -152,7 +159,13 @@ def _patients(entries: Sequence[Entry], recipe: Recipe, out: Path) -> dict[str |
 
 
 def _task(
-    entry: Entry, of: tuple[Profile, Model | None] | None, recipe: Recipe, limit: int, again: bool, out: Path
+    entry: Entry,
+    of: tuple[Profile, Model | None] | None,
+    recipe: Recipe,
+    limit: int,
+    again: bool,
+    out: Path,
+    ranges: TimeRanges,
 ) -> Task:
     profile, model = (None, None) if of is None else of
     text = None if model is None else dump_json(model_to_json(model))
@@ -162,6 +175,8 @@ def _task(
         "profile": _hash(entry.problem) if profile is None else profile.sha256,
         "model": "" if text is None else _hash(text),
     }
+    if ranges:
+        stamp["ranges"] = as_text(ranges)
     log, paths = "+".join(map(str, entry.paths)), entry.paths
     name = log_name(log)
     place = out / "batch" / "results" / f"{name[:60]}-{key_of(paths, stamp)}"
@@ -180,6 +195,7 @@ def _task(
         limit,
         again,
         entry.problem,
+        ranges,
     )
 
 

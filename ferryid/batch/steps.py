@@ -18,7 +18,7 @@ from ferryid.models import Model, blank_model
 from ferryid.report.batch_rows import BaseAndModel, DiagnosisSummary, EvaluationSummary, FindingSummary, FitSummary
 from ferryid.report.diagnosis_report import diagnose_and_report
 from ferryid.report.fit_report import fit_and_report
-from ferryid.types import RunContext
+from ferryid.types import RunContext, TimeRanges
 from ferryid.vessel.profile import Profile
 
 LONGEST_NAME = 80
@@ -44,6 +44,8 @@ class Job:
         Output folder whose ``logs`` keep the ingested tables.
     recorded
         The log's own folder of these.
+    ranges
+        What of the log is used; all of it where empty.
     """
 
     log: str
@@ -55,11 +57,12 @@ class Job:
     folder: Path
     tables: Path
     recorded: Path
+    ranges: TimeRanges = ()
 
     @property
     def context(self) -> RunContext:
         """Results go to the folder, ingested tables to those that all logs share."""
-        return RunContext(self.folder, tables_out=self.tables)
+        return RunContext(self.folder, tables_out=self.tables, ranges=self.ranges)
 
     def below(self, path: str | Path) -> str:
         """Return a path relative to the folder."""
@@ -110,6 +113,7 @@ def _evaluated(job: Job) -> EvaluationSummary:
 
 def _diagnosed(job: Job) -> DiagnosisSummary:
     words = ["ferryid", "diagnose", job.log, *(["--vessel", job.vessel] if job.vessel else [])]
+    words += [word for option in _range_words(job.ranges) for word in option]
     words += [word for signal in job.recipe.withhold for word in ("--withhold", signal)]
     made = diagnose_and_report(
         [job.log],
@@ -131,6 +135,12 @@ def _diagnosed(job: Job) -> DiagnosisSummary:
         before=finite(told["before"]["mse"]),
         after=finite(told["after"]["mse"]),
     )
+
+
+def _range_words(ranges: TimeRanges) -> list[tuple[str, str]]:
+    """Return ranges as options of a command line."""
+    sides = (("--from", [first for first, _ in ranges]), ("--to", [last for _, last in ranges]))
+    return [(name, ",".join(map(str, times))) for name, times in sides if times and times[0] is not None]
 
 
 CARRY_OUT: Mapping[str, Callable[[Job], StepSummary]] = {

@@ -23,6 +23,7 @@ from ferryid.files import alone, unwritable, write_text
 if TYPE_CHECKING:
     from ferryid.signals.data_quality import LostData
     from ferryid.signals.stream import Recording
+    from ferryid.types import TimeRanges
     from ferryid.vessel.profile import Profile
 
 # Heavy packages are imported by the work itself, so that what it needs of memory is counted.
@@ -63,6 +64,8 @@ class Task:
         True: done again if it went wrong.
     problem
         Why the log cannot be used, where that is known before it is read.
+    ranges
+        What of the log is used; all of it where empty.
     """
 
     log: str
@@ -79,6 +82,7 @@ class Task:
     memory_bytes: int
     again: bool = False
     problem: str = ""
+    ranges: TimeRanges = ()
 
     def row(self, status: str, reason: str = "") -> LogResult:
         """Return a row without results."""
@@ -169,7 +173,7 @@ def _carry_out(task: Task, row: LogResult) -> Iterator[LogResult]:
     profile = parse_profile(task.profile_text, task.profile_path)
     model = None if task.model_text is None else model_from_json(json.loads(task.model_text), "the model of the recipe")
     begun = time.perf_counter()
-    recording = record(task.log, profile, task.tables)
+    recording = record(task.log, profile, task.tables, ranges=task.ranges)
     row = replace(
         row,
         sha256=recording.sha256,
@@ -181,7 +185,9 @@ def _carry_out(task: Task, row: LogResult) -> Iterator[LogResult]:
     yield row
     recorded = folder_of(task.tables, recording.name, recording.sha256, profile.sha256)
     del recording
-    job = Job(task.log, task.name, task.vessel, profile, model, task.recipe, task.folder, task.tables, recorded)
+    job = Job(
+        task.log, task.name, task.vessel, profile, model, task.recipe, task.folder, task.tables, recorded, task.ranges
+    )
     refused = {}
     for step in task.recipe.steps:
         begun, found = time.perf_counter(), None

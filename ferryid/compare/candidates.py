@@ -9,6 +9,7 @@ from itertools import combinations
 from ferryid.effects.wording import listed
 from ferryid.errors import FerryIdError
 from ferryid.models import Model, blank_model, model_to_json
+from ferryid.signals.time_ranges import shares_data
 from ferryid.vessel import parse_profile
 from ferryid.vessel.profile import Profile
 
@@ -31,7 +32,8 @@ class Candidate:
     def trained_on(self, sha256: str) -> bool:
         """Tell whether the model, or its diagnosis, has learnt from the log of this hash."""
         seen = {str(log["sha256"]) for log in self.model.training}
-        return sha256 in seen | {known.sha256 for known in self.model.conditions}
+        seen |= {known.sha256 for known in self.model.conditions}
+        return any(shares_data(one, sha256) for one in seen)
 
 
 @dataclass(frozen=True)

@@ -128,7 +128,7 @@ def compare(
     compared: list[ComparedLog] = []
     for path in logs:
         run.progress(f"comparing on {Path(path).name}")
-        compared.append(_compare_log(field, path, run.tables, window_s, compared))
+        compared.append(_compare_log(field, path, run, window_s, compared))
     run.progress("comparing")
     runnable, notes = _models_that_run(field.candidates, compared)
     judged = [_pair_errors(field, [log], runnable) for log in compared]
@@ -178,10 +178,10 @@ def _model(candidate: Candidate) -> ComparedModel:
 
 
 def _compare_log(
-    field: CandidateSet, path: str, tables: Path | None, window_s: float, before: Sequence[ComparedLog]
+    field: CandidateSet, path: str, run: RunContext, window_s: float, before: Sequence[ComparedLog]
 ) -> ComparedLog:
     diagnosed = any(one.model.diagnosed for one in field.candidates)
-    prepared = prepare(path, field.profile, tables, window_s=window_s, keep_track=diagnosed)
+    prepared = prepare(path, field.profile, run.tables, window_s=window_s, keep_track=diagnosed, ranges=run.ranges)
     motion, sha256 = prepared.motion, prepared.recording.sha256
     if sha256 in [other.sha256 for other in before]:
         raise FerryIdError(f"{path}: the same log as another, which would count twice. Fix: give it once")

@@ -13,6 +13,7 @@ from ferryid.identify import check_window
 from ferryid.models import RANGE_UNITS, ForceScores, Model, StoredEffect, force_scores, outside_ranges, usable_rows
 from ferryid.models.prediction import Prediction, predict, predict_base, signal_map
 from ferryid.signals.prepare import prepare
+from ferryid.signals.time_ranges import shares_data
 from ferryid.signals.track import Motion
 from ferryid.types import Flags, RunContext
 from ferryid.vessel.profile import Profile
@@ -63,6 +64,7 @@ def evaluate(
             smoother=smoother,
             rate_hz=model.settings.get("rate_hz"),
             keep_track=model.diagnosed,
+            ranges=run.ranges,
         )
         motion = prepared.motion
         new = predict(model, prepared, profile, window_s=window, smoother=smoother)
@@ -146,6 +148,6 @@ def range_warnings(model: Model, motion: Motion, rows: Flags) -> list[str]:
 
 def _warnings(sha256: str, model: Model, motion: Motion, rows: Flags) -> list[str]:
     warnings = range_warnings(model, motion, rows)
-    if any(log["sha256"] == sha256 for log in model.training):
+    if any(shares_data(str(log["sha256"]), sha256) for log in model.training):
         warnings.append("the model was trained on this log: its scores here are no evidence")
     return warnings

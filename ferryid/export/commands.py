@@ -13,7 +13,7 @@ from ferryid.export.log_file import export_log
 from ferryid.export.model_file import export_model
 from ferryid.files import check_result
 from ferryid.models.store import load
-from ferryid.types import no_progress
+from ferryid.types import TimeRanges, no_progress
 from ferryid.vessel import choose_vessel, parse_profile
 
 
@@ -30,6 +30,7 @@ def export(
     overwrite: bool = False,
     json: Path | None = None,
     progress: Callable[[str], None],
+    ranges: TimeRanges = (),
     tell: Callable[[str], None] = no_progress,
 ) -> dict[str, Any]:
     """Export a model, or with `mcap` a log; return what was written (``ferryid.export/1``).
@@ -50,6 +51,8 @@ def export(
         Where the caller will write the result; looked at before anything is done.
     progress
         Called with the name of each stage.
+    ranges
+        What of a log is exported; all of it where empty.
     tell
         Called with the vessel of a log where it was not asked for.
 
@@ -58,6 +61,10 @@ def export(
     FerryIdError
         For options that do not go together, and as the two.
     """
+    if mcap is None and ranges:
+        raise FerryIdError(
+            f"--from: is for a log, and without --mcap {what} is a model. Fix: add --mcap FILE, or leave it out"
+        )
     beside = {"--model": model, "--vessel": vessel, "--diagnosis": diagnosis}
     of_log = [name for name, value in beside.items() if value is not None]
     of_model = [name for name, value in (("--to", to), ("--file", file)) if value is not None]
@@ -91,6 +98,7 @@ def export(
         model=loaded,
         diagnosis=diagnosis,
         overwrite=overwrite,
+        ranges=ranges,
         progress=progress,
     )
 

@@ -23,7 +23,7 @@ from ferryid.simulate.logs import CHUNK_BYTES
 from ferryid.simulate.output_paths import check_output
 from ferryid.simulate.recorders import write_mcap
 from ferryid.simulate.sensors import Stream
-from ferryid.types import Floats
+from ferryid.types import Floats, TimeRanges
 from ferryid.vessel.profile import Profile
 
 _FORCE = "/ferryid/force/"
@@ -46,6 +46,7 @@ def export_log(
     model: Model | None = None,
     diagnosis: Path | None = None,
     overwrite: bool = False,
+    ranges: TimeRanges = (),
     progress: Callable[[str], None],
 ) -> dict[str, Any]:
     """Write measured and estimated force, what is left over, motion, and findings, at the log's own times.
@@ -66,6 +67,8 @@ def export_log(
         JSON of a diagnosis of this log, None for no findings.
     overwrite
         Replace an MCAP file that is there.
+    ranges
+        What of the log is exported; all of it where empty.
     progress
         Called with the name of each stage.
 
@@ -91,7 +94,14 @@ def export_log(
     window_s, smoother = float(settings.get("window_s", WINDOW_S)), str(settings.get("smoother", "square"))
     progress(f"reading {Path(log).name}")
     prepared = prepare(
-        log, profile, out, window_s=window_s, smoother=smoother, rate_hz=settings.get("rate_hz"), keep_track=True
+        log,
+        profile,
+        out,
+        window_s=window_s,
+        smoother=smoother,
+        rate_hz=settings.get("rate_hz"),
+        keep_track=True,
+        ranges=ranges,
     )
     motion, track = prepared.motion, prepared.track
     assert track is not None

@@ -22,6 +22,8 @@ def read_logs(paths: Sequence[str], profile: Profile, settings: FitSettings, run
     opened = []
     for path in paths:
         run.progress(f"reading {Path(path).name}")
-        opened.append(open_track(path, profile, run.tables, rate_hz=settings.rate_hz, verify=run.verify))
+        opened.append(
+            open_track(path, profile, run.tables, rate_hz=settings.rate_hz, verify=run.verify, ranges=run.ranges)
+        )
     refuse_twice(opened)
     return opened

@@ -28,8 +28,10 @@ Damage = dict[Path, str]
 
 
 def folder_of(out: Path, name: str, sha256: str, profile_sha256: str) -> Path:
-    """Folder of one recording: ``out/logs/<name>-<hash of the log>-<hash of the profile>``."""
-    return out / "logs" / f"{name}-{sha256.rpartition(':')[2][:8]}-{profile_sha256[:8]}"
+    """Folder of one recording: ``out/logs/<name>-<hash of the log>-<hash of the profile>``, with that of its ranges between."""
+    content, _, ranges = sha256.partition("#")
+    part = f"-{crc32(ranges.encode()):08x}" if ranges else ""
+    return out / "logs" / f"{name}-{content.rpartition(':')[2][:8]}{part}-{profile_sha256[:8]}"
 
 
 def signatures(paths: Sequence[Path]) -> list[list[Any]]:

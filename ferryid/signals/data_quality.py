@@ -14,6 +14,7 @@ from ferryid.json_record import Number, Record, json_key
 from ferryid.signals.parquet import unit_of
 from ferryid.signals.quality import clean
 from ferryid.signals.stream import Recording, Stream
+from ferryid.signals.time_ranges import USED
 from ferryid.signals.track import LeftOut, Motion, Track
 from ferryid.types import Flags
 
@@ -110,7 +111,8 @@ def left_out_sentences(recording: Recording, left_out: Sequence[LeftOut], used: 
 
     `used` are flags of the rows that are, shape (n,).
     """
-    said = [*_unread(recording.losses)]
+    said = [note for note in recording.notes if note.startswith(USED)]
+    said += _unread(recording.losses)
     said += grouped_notes({topic: _of_clock(stream) for topic, stream in recording.streams.items()})
     said += rows_left_out(left_out, max(used.size, _rows(left_out) + int(np.count_nonzero(used))))
     return tuple(said)

@@ -10,13 +10,29 @@ from ferryid.counts import counted
 from ferryid.signals import cache
 from ferryid.signals.parquet import unit_of
 from ferryid.signals.recording import data_quality, record
+from ferryid.types import TimeRanges
 from ferryid.vessel.profile import Profile
 
 
 def ingest(
-    logs: Sequence[str], profile: Profile, out: Path, *, verify: bool = False, progress: Callable[[str], None]
+    logs: Sequence[str],
+    profile: Profile,
+    out: Path,
+    *,
+    verify: bool = False,
+    ranges: TimeRanges = (),
+    progress: Callable[[str], None],
 ) -> dict[str, Any]:
     """Read the mapped signals of logs into ``out/logs``, one Parquet table per topic.
+
+    Parameters
+    ----------
+    logs, profile, out, verify
+        As of `ferryid.signals.recording.record`.
+    ranges
+        What of each log is written; all of it where empty.
+    progress
+        Called with the name of each stage.
 
     Returns
     -------
@@ -31,7 +47,9 @@ def ingest(
     entries = []
     for path in logs:
         progress(f"reading {Path(path).name}")
-        recording = record(path, profile, out, verify=verify)
+        recording = record(path, profile, None if ranges else out, verify=verify, ranges=ranges)
+        if ranges:
+            cache.store(out, recording, cache.signatures([Path(file) for file in recording.files]), verify=verify)
         entries.append(
             {
                 "name": recording.name,

@@ -30,7 +30,9 @@ from ferryid.signals.prepare import track_of
 from ferryid.signals.recording import log_name, make_recording, selected
 from ferryid.signals.render import render_inspect
 from ferryid.signals.thresholds import SIGNALS
+from ferryid.signals.time_ranges import cut
 from ferryid.signals.track import LeftOut
+from ferryid.types import TimeRanges
 from ferryid.vessel.choice import named_profiles
 from ferryid.vessel.profile import Profile
 from ferryid.vessel.signal_map import Selection, select, survey
@@ -41,7 +43,9 @@ SCHEMA = "ferryid.inspect/1"
 _BULKY = ("uint8", "int8", "byte", "char", "octet", "float32", "float64", "uint16", "int16", "bytes")
 
 
-def inspect(path: str | Path, profile: Profile | None = None, *, verify: bool = False) -> dict[str, Any]:
+def inspect(
+    path: str | Path, profile: Profile | None = None, *, verify: bool = False, ranges: TimeRanges = ()
+) -> dict[str, Any]:
     """List what a log holds, and what a vessel profile makes of it.
 
     Parameters
@@ -52,6 +56,8 @@ def inspect(path: str | Path, profile: Profile | None = None, *, verify: bool = 
         Vessel profile whose signals are looked for; without one all profiles that have a name are tried.
     verify
         Read the whole log, check every checksum and hash every byte.
+    ranges
+        Of what the signals of the profile are shown, all of the log where empty; topics are listed whole in any case.
 
     Returns
     -------
@@ -73,7 +79,7 @@ def inspect(path: str | Path, profile: Profile | None = None, *, verify: bool = 
         repaired = repair_all(series)
         vessel = None
         if profile is not None and selection is not None:
-            vessel = _vessel(reader, log_name(path), profile, selection, series, problems)
+            vessel = _vessel(reader, log_name(path), profile, selection, series, problems, ranges)
         sha256 = hashing.result()
     described = [_timed(topic, series, repaired) for topic in sorted(reader.topics, key=lambda one: one.name)]
     topics = [
@@ -184,6 +190,7 @@ def _vessel(
     selection: Selection,
     series: Mapping[str, Series],
     problems: Mapping[str, str],
+    ranges: TimeRanges = (),
 ) -> dict[str, Any]:
     """What a fit with the profile makes of the log: signals with their ranges, what it leaves out, and why it refuses."""
     usable, problem = True, ""
@@ -205,6 +212,7 @@ def _vessel(
             recording = make_recording(
                 reader, name, profile, replace(selection, wanted=wanted), mapped, repair_all(mapped)
             )
+            recording = cut(recording, profile, ranges)
             streams = {topic: stream_quality(one) for topic, one in recording.streams.items() if len(one.time_ns)}
             faults = find_faults(recording)
             told = [*selection.notes, *faults.taken_out]

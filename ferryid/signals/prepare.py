@@ -19,6 +19,7 @@ from ferryid.signals.sampling import check_sampling
 from ferryid.signals.smooth import Measured, measure, smooth_measured
 from ferryid.signals.thresholds import SIGNALS
 from ferryid.signals.track import Motion, Track
+from ferryid.types import TimeRanges
 from ferryid.vessel import SWAY_NOT_MEASURED
 from ferryid.vessel.profile import Profile
 
@@ -92,10 +93,16 @@ def _overlap(recording: Recording, track: Track) -> list[str]:
 
 
 def open_track(
-    path: str, profile: Profile, out: Path | None, *, rate_hz: float | None = None, verify: bool = False
+    path: str,
+    profile: Profile,
+    out: Path | None,
+    *,
+    rate_hz: float | None = None,
+    verify: bool = False,
+    ranges: TimeRanges = (),
 ) -> Opened:
     """Ingest and align one log, and reconstruct its forces; arguments and errors are those of `prepare`."""
-    return track_of(record(path, profile, out, verify=verify), profile, rate_hz)
+    return track_of(record(path, profile, out, verify=verify, ranges=ranges), profile, rate_hz)
 
 
 def track_of(
@@ -123,6 +130,7 @@ def prepare(
     rate_hz: float | None = None,
     verify: bool = False,
     keep_track: bool = False,
+    ranges: TimeRanges = (),
 ) -> Prepared:
     """Ingest, align and smooth one log.
 
@@ -140,13 +148,15 @@ def prepare(
         Check every checksum.
     keep_track
         Return the aligned signals as well.
+    ranges
+        What of the log is used; all of it where empty.
 
     Raises
     ------
     FerryIdError
         For a log that cannot be used, also one whose signals contradict each other beyond doubt.
     """
-    opened = open_track(path, profile, out, rate_hz=rate_hz, verify=verify)
+    opened = open_track(path, profile, out, rate_hz=rate_hz, verify=verify, ranges=ranges)
     return smoothed(opened, window_s, smoother, keep_track=keep_track)
 
 

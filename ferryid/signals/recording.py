@@ -17,14 +17,17 @@ from ferryid.ingest.log import Reader, Series, Topic
 from ferryid.signals import cache
 from ferryid.signals.data_quality import data_quality, grouped_notes, loss_sentence, main_loss
 from ferryid.signals.stream import Recording, Stream
-from ferryid.types import Nanoseconds
+from ferryid.signals.time_ranges import cut
+from ferryid.types import Nanoseconds, TimeRanges
 from ferryid.vessel.profile import Profile
 from ferryid.vessel.signal_map import Selection, convert, select
 
 __all__ = ["Recording", "Stream", "data_quality", "log_name", "make_recording", "name_of", "read_recording", "record"]
 
 
-def record(path: str | Path, profile: Profile, out: Path | None = None, *, verify: bool = False) -> Recording:
+def record(
+    path: str | Path, profile: Profile, out: Path | None = None, *, verify: bool = False, ranges: TimeRanges = ()
+) -> Recording:
     """Read the signals that a profile maps from one log.
 
     Parameters
@@ -38,12 +41,19 @@ def record(path: str | Path, profile: Profile, out: Path | None = None, *, verif
         profile and ferryid version are unchanged.
     verify
         Read the whole log, check every checksum and hash every byte, also of what is not mapped.
+    ranges
+        What of the log is used, all of it where empty: see `ferryid.signals.time_ranges`. Kept is the whole log.
 
     Raises
     ------
     FerryIdError
-        For a log that cannot be used: no known format, a required signal that it lacks, no row, an unwritable `out`.
+        For a log that cannot be used: no known format, a required signal that it lacks, no row, a range outside it, an
+        unwritable `out`.
     """
+    return cut(_whole(path, profile, out, verify=verify), profile, ranges)
+
+
+def _whole(path: str | Path, profile: Profile, out: Path | None, *, verify: bool) -> Recording:
     name = log_name(path)
     damage: cache.Damage = {}
     if out is not None and Path(path).is_file():

@@ -104,12 +104,12 @@ def source_of(stream: Stream) -> Source:
                 f"{verb(int(same.sum()), 'repeats')} an old one to the last digit for more "
                 f"than {frozen:.2f} s; taken as missing."
             )
-    on_change = _on_change(time_s, stream.columns)
+    unchanged = _on_change(time_s, stream.columns)
     interval = np.diff(time_s)
     gaps = interval > bridge
     if interval.size and all(is_load(name) for name in columns):
         remarks.append(f"{stream.topic}: each value holds until the next, at most for {interval.max():.1f} s.")
-    elif interval.size and on_change:
+    elif interval.size and unchanged:
         remarks.append(
             f"{stream.topic}: published when it changes; each value holds until the next, "
             f"at most for {interval.max():.1f} s."
@@ -120,7 +120,7 @@ def source_of(stream: Stream) -> Source:
             "all; not bridged."
         )
     return Source(
-        stream.topic, time_ns, columns, period, bridge, on_change, tuple(held), tuple(taken_out), tuple(remarks)
+        stream.topic, time_ns, columns, period, bridge, unchanged, tuple(held), tuple(taken_out), tuple(remarks)
     )
 
 
@@ -151,6 +151,12 @@ def _usual_period(time_s: Floats) -> float:
             break
         period = shorter
     return period
+
+
+def on_change(stream: Stream) -> bool:
+    """True for a stream whose values hold until the next: of orders, or published when it changes."""
+    time_s = (stream.time_ns - stream.time_ns[0]) * 1e-9
+    return all(is_order(name) for name in stream.columns) or _on_change(time_s, stream.columns)
 
 
 def _on_change(time_s: Floats, columns: Mapping[str, Floats]) -> bool:

@@ -90,7 +90,7 @@ def test_a_log_for_a_viewer(ferryid, fixtures: Path, out: Path, tmp_path: Path) 
         (("milliampere", "--to", "c", "--vessel", "milliampere"), "--vessel: is for a log"),
         (("milliampere", "--to", "c", "--model", "milliampere"), "--model: is for a log"),
         (("milliampere", "--diagnosis", "d.json"), "--diagnosis: is for a log"),
-        (("short.mcap", "--mcap", "v.mcap", "--to", "c"), "--to: is for a model"),
+        (("short.mcap", "--mcap", "v.mcap", "--to", "c"), "--to c: 'c' is no time"),
         (("short.mcap", "--mcap", "v.mcap", "--file", "v.h"), "--file: is for a model"),
         (("missing.mcap", "--mcap", "v.mcap", "--vessel", "milliampere"), "missing.mcap"),
         (("milliampere", "--to", "matlab", "--file", "my-boat.m"), "my-boat.m"),

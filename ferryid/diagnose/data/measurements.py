@@ -136,7 +136,7 @@ def read_measurements(
             "ferryid fit, which reduces the model to surge and yaw"
         )
     run.progress(f"reading {Path(path).name}")
-    recording = record(path, profile, run.tables, verify=run.verify)
+    recording = record(path, profile, run.tables, verify=run.verify, ranges=run.ranges)
     try:
         check_sampling(recording, profile)
         faults = find_faults(recording)
