@@ -2,17 +2,65 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ferryid.cli.options import Json
-from ferryid.cli.output import emit, progress
+from ferryid.cli.output import emit, progress, tell
+
+if TYPE_CHECKING:
+    from ferryid.draft import Question
 
 app = typer.Typer(
-    help="Check, show and list vessel profiles.", no_args_is_help=True, rich_markup_mode=None, add_completion=False
+    help="Draft, check, show and list vessel profiles.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    add_completion=False,
 )
 File = Annotated[str, typer.Argument(help="Path of a profile (TOML), or the name of one: see ferryid vessel list.")]
+
+
+@app.command()
+def new(
+    log: Annotated[str, typer.Argument(help="A bag, MCAP file, table or folder; parts of one log joined by +.")],
+    like: Annotated[
+        str | None,
+        typer.Option(
+            "--like", help="Profile to take hull, thrust and the layout of tables from: a name, or a TOML file."
+        ),
+    ] = None,
+    name: Annotated[str, typer.Option(help="Name of the vessel; of the log's folder if left out.")] = "",
+    file: Annotated[
+        Path | None,
+        typer.Option(help="Where to write the profile, - for standard output; vessel.toml beside the log if left out."),
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a profile that is there.")] = False,
+    ask: Annotated[
+        bool, typer.Option("--ask/--no-ask", help="Ask on a terminal for what no log shows; else its lines are marked.")
+    ] = True,
+    json: Json = None,
+) -> None:
+    """Draft a profile from a log: which topics are what, in which unit and frame, with the evidence."""
+    from ferryid import api
+
+    asking = _asked if ask and sys.stdin.isatty() and sys.stderr.isatty() else None
+    outcome = api.new_vessel(log, like, name=name, file=file, overwrite=overwrite, ask=asking, progress=progress)
+    if str(file) == "-" and json != "-":
+        typer.echo(outcome.json["toml"], nl=False)
+        return
+    emit(outcome, json)
+
+
+def _asked(question: Question) -> str:
+    """Ask a person, until the answer is one; nothing leaves it open."""
+    while True:
+        answer = str(typer.prompt(f"{question.text}, empty to leave open", default="", show_default=False, err=True))
+        if question.accepts(answer):
+            return answer
+        tell(f"{answer!r} is no answer here")
 
 
 @app.command()

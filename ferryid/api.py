@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
     from ferryid.diagnose import DiagnosisSettings
+    from ferryid.draft import Question
     from ferryid.identify import FitSettings
     from ferryid.models import Model
     from ferryid.report.fit_report import FitReport
@@ -42,6 +43,7 @@ __all__ = [
     "ingest",
     "inspect",
     "models",
+    "new_vessel",
     "promote",
     "prove",
     "reproduce",
@@ -643,6 +645,42 @@ def check_vessel(file: str | Path, *, identifiable: bool = False, progress: Prog
 
     found = study(_profile(file), progress)
     return _outcome({**result, "identifiability": as_json(found)}, f"{text}\n\n{as_text(found)}")
+
+
+def new_vessel(
+    log: str | Path,
+    like: str | Path | Profile | None = None,
+    *,
+    name: str = "",
+    file: str | Path | None = None,
+    overwrite: bool = False,
+    ask: Callable[[Question], str] | None = None,
+    progress: Progress = _quiet,
+) -> Outcome:
+    """Draft a vessel profile from a log and write it; see `ferryid.draft.new_profile`. The text is ``outcome.json["toml"]``.
+
+    Parameters
+    ----------
+    log
+        Path; parts of one recording joined by ``+``.
+    like
+        A profile that hull, thrust and the layout of tables are taken from.
+    name
+        Name of the vessel; of the log's folder where empty.
+    file
+        Where to; ``vessel.toml`` beside the log where None, nowhere where it is ``-``.
+    overwrite
+        Replace a file that is there.
+    ask
+        Called with each `ferryid.draft.Question` that no log answers; what is not answered is a marked line.
+    """
+    from ferryid.draft import new_profile
+
+    result, text, toml = new_profile(
+        str(log), None if like is None else _profile(like), name=name, file=None if file is None else Path(file),
+        overwrite=overwrite, ask=ask, progress=progress,
+    )  # fmt: skip
+    return _outcome({**result, "toml": toml}, text)
 
 
 def reproduce(

@@ -27,6 +27,7 @@ ORDER = (
     "ingest",
     "vessel",
     "signals",
+    "draft",
     "effects",
     "regression",
     "models",

@@ -6,12 +6,12 @@ one. Orders, errors and what concerns wind or water are left out. Columns withou
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from ferryid.diagnose.data.measurements import WITHHELD
 from ferryid.ingest.log import Topic
+from ferryid.vessel.field_words import words_of
 from ferryid.vessel.profile import Profile
 from ferryid.vessel.signal_map import canonical_columns
 
@@ -145,13 +145,6 @@ class Candidate:
         fields = first.removesuffix(first[-1]).rstrip("._ ") if self.form == "quaternion" else ""
         fields = fields or ", ".join(self.fields)
         return fields if self.topic == "table" else self.topic if fields == _SINGLE else f"{self.topic} {fields}"
-
-
-def words_of(path: str) -> tuple[str, ...]:
-    """Return the words of a field's path or a topic's name in lower case, units in brackets excepted."""
-    text = re.sub(r"\[[^\]]*\]|\([^)]*\)", " ", path)
-    text = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", text)
-    return tuple(word for word in re.split(r"[^A-Za-z0-9]+|(?<=[a-z]{3})(?=[0-9])", text.lower()) if word)
 
 
 def candidates(profile: Profile, topics: Sequence[Topic], withhold: Collection[str] = ()) -> tuple[Candidate, ...]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ferryid.diagnose.checks.spans import RATE_HZ
 from ferryid.diagnose.data.measurements import MeasuredLog
-from ferryid.diagnose.second_sources.candidates import Candidate, words_of
+from ferryid.diagnose.second_sources.candidates import Candidate
 from ferryid.diagnose.second_sources.thresholds import SECOND
 from ferryid.errors import FerryIdError
 from ferryid.ingest import open_log
@@ -19,6 +19,7 @@ from ferryid.ingest.log import Series
 from ferryid.signals.quality import clean
 from ferryid.signals.stream import Recording
 from ferryid.types import Flags, Floats, Nanoseconds
+from ferryid.vessel.field_words import words_of
 from ferryid.vessel.frames import WGS84_A_M, local_north_east, yaw_of_quaternion
 
 NOT_READ, FEW, CONSTANT, BROKEN, APART, MANY = (

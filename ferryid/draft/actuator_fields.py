@@ -1,0 +1,194 @@
+"""Which fields of a log are speeds, angles and forces of actuators, and which actuator each belongs to, by their names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from ferryid.draft.fields import ORDERS, numeric_fields, rate_of
+from ferryid.ingest.log import Topic
+from ferryid.vessel.field_words import words_of
+
+_SPEED = frozenset({"rpm", "rps", "speed", "n", "revs", "revolutions", "rotation", "shaft"})
+_ANGLE = frozenset({"azimuth", "azi", "angle", "alpha", "direction", "steering", "nozzle"})
+_RUDDER = frozenset({"rudder", "delta"})
+_FORCE = frozenset({"force", "thrust", "newton", "thruster"})
+_DUTY = frozenset({"pwm", "throttle", "duty", "percent"})
+_BASES = (
+    "thruster",
+    "propeller",
+    "prop",
+    "motor",
+    "azimuth",
+    "azi",
+    "pod",
+    "actuator",
+    "outboard",
+    "engine",
+    "esc",
+    "rudder",
+)
+_SIDES = (
+    "stern",
+    "aft",
+    "bow",
+    "fore",
+    "front",
+    "rear",
+    "port",
+    "starboard",
+    "left",
+    "right",
+    "center",
+    "centre",
+    "mid",
+)
+_FEEDBACK = frozenset({"state", "feedback", "actual", "measured", "encoder", "status"})
+_UNRELATED = frozenset(
+    [
+        "desired",
+        "error",
+        "err",
+        "voltage",
+        "current",
+        "power",
+        "temp",
+        "temperature",
+        "pcb",
+        "stator",
+        "battery",
+        "charge",
+        "supply",
+        "torque",
+        "fault",
+        "stop",
+        "limit",
+        "menu",
+        "miles",
+        "minutes",
+        "switches",
+        "setup",
+        "code",
+        "wind",
+        "wrench",
+        "tau",
+    ]
+)
+_MARKS = frozenset(
+    {*_BASES, *_SIDES, *_RUDDER, "rpm", "azi", "thrust", "pwm", "lpwm", "rpwm", "thrusters", "actuators"}
+)
+
+
+@dataclass(frozen=True)
+class ActuatorField:
+    """One field of an actuator.
+
+    Attributes
+    ----------
+    actuator
+        Name of the actuator, made of the words of topic and field.
+    role
+        ``speed``, ``angle``, ``rudder``, ``force`` or ``duty`` (a share of full power, or a pulse width).
+    order
+        True for an order, False for feedback, None where no word says which.
+    topic, path
+        Where it is.
+    rate_hz
+        Messages per second.
+    """
+
+    actuator: str
+    role: str
+    order: bool | None
+    topic: str
+    path: str
+    rate_hz: float
+
+    @property
+    def label(self) -> str:
+        """Topic and field."""
+        return f"{self.topic}: {self.path}"
+
+
+def actuator_fields(topics: Sequence[Topic]) -> list[ActuatorField]:
+    """Return the fields of actuators in the order of the log, each with the actuator that it belongs to."""
+    found = []
+    for topic in topics:
+        around = () if topic.name == "table" else _split(words_of(topic.name))
+        if topic.count < 2 or set(around) & (_UNRELATED | {"odometry", "navigation"}):
+            continue
+        fields = numeric_fields(topic)
+        bare = {words[0] for words in fields.values() if len(words) == 1}
+        for path, own in fields.items():
+            words = _split(own)
+            every = (*around, *words)
+            marked = bool(set(every) & _MARKS) or (
+                topic.encoding == "table" and words == ("n",) and bool(bare & {"rudder"})
+            )
+            if not marked or set(words) & _UNRELATED:
+                continue
+            role = _role(words, around)
+            if role:
+                found.append(
+                    ActuatorField(_name(every, role), role, _order(every, role), topic.name, path, rate_of(topic))
+                )
+    names = {one.actuator for one in found}
+    if names == {"azimuth", "propeller"}:
+        # One speed and one angle without a number: one thruster.
+        found = [replace(one, actuator="azimuth") for one in found]
+    return found
+
+
+def _split(words: Sequence[str]) -> tuple[str, ...]:
+    """Part what is written as one: a side before pwm."""
+    parted: list[str] = []
+    for word in words:
+        if match := re.fullmatch(r"(l|r|left|right)(pwm|rpm|thruster|motor)", word):
+            parted += [{"l": "left", "r": "right"}.get(match[1], match[1]), match[2]]
+        else:
+            parted.append(word)
+    return tuple(parted)
+
+
+def _role(words: Sequence[str], around: Sequence[str]) -> str:
+    """Return the role of a field: by its own words, and of one that is called data, by its topic's."""
+    own = [word for word in words if word not in ("data", "value", "x", "cmd", "command", "reference", "ref")]
+    for said in (set(own), set(around)):
+        for role, names in (
+            ("duty", _DUTY),
+            ("rudder", _RUDDER),
+            ("angle", _ANGLE),
+            ("speed", _SPEED),
+            ("force", _FORCE),
+        ):
+            if said & names and not (role == "force" and said & {"speed", "rpm"}):
+                return role
+        if "prop" in said:
+            return "speed"
+        if own:
+            return ""
+    return ""
+
+
+def _order(words: Sequence[str], role: str) -> bool | None:
+    said = set(words)
+    if said & (ORDERS | _DUTY):
+        return True
+    if said & _FEEDBACK or {"motor", "speed"} <= said:
+        return False
+    # A force on a hull is hardly ever measured: what has that name is what a controller asks for.
+    return True if role == "force" and "thruster" in said else None
+
+
+def _name(words: Sequence[str], role: str) -> str:
+    """Return the name of an actuator: side and number, or what it is where there is but one."""
+    sides = [word for word in dict.fromkeys(words) if word in _SIDES]
+    number = next((word for word in words if word.isdigit()), "")
+    base = next((word for word in words if word in _BASES), "")
+    base = {"prop": "propeller", "azi": "azimuth"}.get(base, base)
+    if sides:
+        return "_".join(sides) + number
+    if number:
+        return (base or "actuator") + number
+    return base if base and base not in ("rudder", "azimuth") else {"angle": "azimuth"}.get(role, "propeller")

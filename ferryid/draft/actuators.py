@@ -1,0 +1,225 @@
+"""Kinds, roles, units and signs of actuators, by names and by what the vessel does when they act."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ferryid.draft.actuator_fields import ActuatorField
+from ferryid.draft.kinematics import MappedSignal, Motion
+from ferryid.draft.samples import Samples
+from ferryid.draft.thresholds import DRAFT
+from ferryid.types import Floats
+from ferryid.vessel.field_words import unit_of_name, words_of
+
+UNKNOWN_ORDER = "whether it is an order or was measured: an order has .command behind its name"
+"""Doubt of a signal whose name does not state it."""
+_LAGS_S = (0.0, 0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0)
+"""Delays at which a motion is compared with an actuator [s]."""
+
+
+@dataclass(frozen=True)
+class DraftedActuator:
+    """An actuator: its name, its kind as of `ferryid.vessel.profile.Actuator`, and its signals."""
+
+    name: str
+    kind: str
+    signals: tuple[MappedSignal, ...]
+
+
+def drafted_actuators(fields: Sequence[ActuatorField], samples: Samples, motion: Motion) -> list[DraftedActuator]:
+    """Return the actuators of a log with their signals."""
+    fields = [one for one in fields if (one.topic, one.path) in samples.columns]
+    names = list(dict.fromkeys(one.actuator for one in fields))
+    chosen = {name: _chosen([one for one in fields if one.actuator == name]) for name in names}
+    chosen = {name: roles for name, roles in chosen.items() if roles}
+    kinds = {name: _kind(name, roles) for name, roles in chosen.items()}
+    turning = _azimuth_sign(chosen, kinds, samples, motion)
+    found = []
+    for name, roles in chosen.items():
+        signals = []
+        for (role, order), field in roles.items():
+            signal = _signal(name, kinds[name], role, order, field, samples)
+            if role == "angle":
+                signal = _signed(signal, turning)
+            elif role == "rudder":
+                signal = _signed(signal, _rudder_sign(field, samples, motion))
+            elif role == "force" and kinds[name] == "force":
+                signal = _signed(signal, _pair_doubt(name, chosen, samples, motion))
+            signals.append(signal)
+        found.append(DraftedActuator(name, kinds[name], tuple(signals)))
+    return found
+
+
+_Roles = dict[tuple[str, bool], ActuatorField]
+_Sign = tuple[float, str, str]
+"""Sign, evidence and doubt."""
+
+
+def _chosen(fields: Sequence[ActuatorField]) -> _Roles:
+    """Return one field for every role, feedback and order; a duty only where nothing else shows how hard it pushes."""
+    found: _Roles = {}
+    for field in fields:
+        order = field.order is True
+        found.setdefault((field.role, order), field)
+    strong = any(role in ("speed", "force") for role, _ in found)
+    return {key: field for key, field in found.items() if not (key[0] == "duty" and strong)}
+
+
+def _kind(name: str, roles: _Roles) -> str:
+    kinds = {role for role, _ in roles}
+    if "rudder" in kinds:
+        return "propeller_rudder"
+    if "angle" in kinds:
+        return "azimuth"
+    if "tunnel" in name:
+        return "tunnel"
+    return "force" if kinds == {"force"} else "propeller"
+
+
+def _signal(name: str, kind: str, role: str, order: bool, field: ActuatorField, samples: Samples) -> MappedSignal:
+    quantity = {"duty": "speed", "force": "force" if kind == "force" else "thrust"}.get(role, role)
+    values = samples.raw(field.topic, field.path)
+    values = values[np.isfinite(values)]
+    largest = float(np.quantile(np.abs(values), 0.99)) if values.size else 0.0
+    unit, why, doubt = _unit(role, field, largest)
+    evidence = (
+        *([f"{'an order' if order else 'feedback'}, by its name"] if field.order is not None else []),
+        f"{unit}: {why}",
+    )
+    return MappedSignal(
+        f"{name}.{quantity}{'.command' if order else ''}",
+        field.topic,
+        (field.path,),
+        unit,
+        evidence=evidence,
+        doubts=tuple(filter(None, [doubt, "" if field.order is not None else UNKNOWN_ORDER])),
+    )
+
+
+def _unit(role: str, field: ActuatorField, largest: float) -> tuple[str, str, str]:
+    """Return unit, why, and what to check."""
+    kind = {"angle": "angle", "rudder": "angle", "force": "force", "speed": "rotation", "duty": "fraction"}[role]
+    stated = unit_of_name(field.path, kind)
+    words = {*words_of(field.path), *words_of(field.topic)}
+    shown = f"99 % of the values lie within {largest:.4g}"
+    if stated:
+        return stated, "in its name", ""
+    if kind == "angle":
+        if largest > DRAFT.most_rad:
+            return "deg", f"{shown}, more than a turn in radians", ""
+        return "rad", shown, "" if "rad" in words else "degrees are possible where it never turns far"
+    if kind == "force":
+        return "N", shown, "the unit is assumed"
+    if kind == "fraction":
+        return "%", shown, "a share of full power: give the range and the speed at full power"
+    named = next((unit for unit in ("rpm", "rps") if unit in words), "")
+    if named:
+        return named, "in its name", ""
+    if largest > DRAFT.most_rps:
+        return "rpm", shown, "" if "motor" in words or largest > 2.0 * DRAFT.most_rps else "a percentage is possible"
+    return "rps", f"{shown}, too slow for rpm", "the unit is assumed"
+
+
+def _signed(signal: MappedSignal, sign: _Sign) -> MappedSignal:
+    value, evidence, doubt = sign
+    return replace(
+        signal,
+        sign=value,
+        evidence=(*signal.evidence, *filter(None, [evidence])),
+        doubts=(*signal.doubts, *filter(None, [doubt])),
+    )
+
+
+def _on_grid(field: ActuatorField, samples: Samples) -> Floats:
+    return samples.on_grid(field.topic, samples.raw(field.topic, field.path), held=True)
+
+
+def _response(cause: Floats, effect: Floats, step_s: float) -> float:
+    """Return the correlation of a motion with what causes it, at the delay where it is strongest."""
+    best = 0.0
+    for lag_s in _LAGS_S:
+        rows = round(lag_s / step_s)
+        early, late = cause[: cause.size - rows], effect[rows:]
+        known = np.isfinite(early + late)
+        if np.count_nonzero(known) < DRAFT.fewest_rows or np.ptp(early[known]) == 0.0:
+            continue
+        value = float(np.corrcoef(early[known], late[known])[0, 1]) if np.ptp(late[known]) > 0.0 else 0.0
+        best = value if abs(value) > abs(best) else best
+    return best
+
+
+def _step(samples: Samples) -> float:
+    return float(samples.grid_s[1] - samples.grid_s[0])
+
+
+def _rudder_sign(field: ActuatorField, samples: Samples, motion: Motion) -> _Sign:
+    """Return the sign of a rudder angle: the positive one turns a vessel that goes ahead to starboard."""
+    ahead = np.where(motion.u > 0.0, 1.0, np.nan)
+    seen = _response(_on_grid(field, samples), motion.r * ahead, _step(samples))
+    if abs(seen) < DRAFT.acts:
+        return (
+            1.0,
+            "",
+            f"the yaw rate does not show its sign (correlation {seen:.2f}): positive to starboard is assumed",
+        )
+    side = "starboard" if seen > 0.0 else "port"
+    return (1.0 if seen > 0.0 else -1.0), f"positive turns to {side} (correlation with the yaw rate {seen:.2f})", ""
+
+
+def _azimuth_sign(chosen: dict[str, _Roles], kinds: dict[str, str], samples: Samples, motion: Motion) -> _Sign:
+    """Return the sign of azimuth angles: one thruster is taken to be at the stern, several move the hull."""
+    side = np.zeros(samples.grid_s.shape)
+    names = [name for name, kind in kinds.items() if kind == "azimuth"]
+    for name in names:
+        angle = _any(chosen[name], "angle")
+        if angle is None:
+            continue
+        turn = np.pi / 180.0 if _unit("angle", angle, _largest(angle, samples))[0] == "deg" else 1.0
+        speed = _any(chosen[name], "speed")
+        push = np.ones(side.shape) if speed is None else _on_grid(speed, samples)
+        side = side + push * np.abs(push) * np.sin(_on_grid(angle, samples) * turn)
+    if len(names) == 1:
+        seen = -_response(side, motion.r, _step(samples))
+        what, where = "turns to port when it pushes to starboard at the stern", " (if it is at the bow, sign = -1)"
+    else:
+        seen, what, where = _response(side, motion.v, _step(samples)), "moves to starboard when they push there", ""
+    if abs(seen) < DRAFT.acts:
+        return 1.0, "", f"the motion does not show the sign of the angle (correlation {seen:.2f}): clockwise is assumed"
+    return (1.0 if seen > 0.0 else -1.0), f"the vessel {what} (correlation {abs(seen):.2f}){where}", ""
+
+
+def _any(roles: _Roles, role: str) -> ActuatorField | None:
+    return roles.get((role, False)) or roles.get((role, True))
+
+
+def _largest(field: ActuatorField, samples: Samples) -> float:
+    values = samples.raw(field.topic, field.path)
+    values = values[np.isfinite(values)]
+    return float(np.quantile(np.abs(values), 0.99)) if values.size else 0.0
+
+
+def _pair_doubt(name: str, chosen: dict[str, _Roles], samples: Samples, motion: Motion) -> _Sign:
+    """Return what the yaw rate shows of two forces side by side: more to port turns to starboard."""
+    sides = {}
+    for other, roles in chosen.items():
+        field = _any(roles, "force")
+        words = set(other.split("_"))
+        if field is not None and words & {"left", "port"}:
+            sides["port"] = field
+        if field is not None and words & {"right", "starboard"}:
+            sides["starboard"] = field
+    if len(sides) < 2 or not set(name.split("_")) & {"left", "right", "port", "starboard"}:
+        return 1.0, "", ""
+    seen = _response(_on_grid(sides["port"], samples) - _on_grid(sides["starboard"], samples), motion.r, _step(samples))
+    if seen > DRAFT.acts:
+        return 1.0, f"more to port than to starboard turns to starboard (correlation {seen:.2f})", ""
+    if seen < -DRAFT.acts:
+        return (
+            1.0,
+            "",
+            f"more to port turns to port (correlation {seen:.2f}): the two are exchanged, or the heading mirrored",
+        )
+    return 1.0, "", ""

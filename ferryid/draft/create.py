@@ -1,0 +1,82 @@
+"""From a log to the file of a drafted profile: what ``ferryid vessel new`` does."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from ferryid.draft.draft import draft_profile
+from ferryid.draft.write import Answers, Question, as_json, as_text, draft_text, questions
+from ferryid.errors import FerryIdError
+from ferryid.files import replacing
+from ferryid.vessel.folder_settings import VESSEL_FILE, log_folder
+from ferryid.vessel.profile import Profile
+
+Ask = Callable[[Question], str]
+"""Returns the answer to a question, an empty one where it is left open."""
+
+
+def new_profile(
+    log: str,
+    like: Profile | None = None,
+    *,
+    name: str = "",
+    file: Path | None = None,
+    overwrite: bool = False,
+    ask: Ask | None = None,
+    progress: Callable[[str], None],
+) -> tuple[dict[str, Any], str, str]:
+    """Draft a profile and write it.
+
+    Parameters
+    ----------
+    log
+        Path; parts of one recording joined by ``+``.
+    like
+        A profile that hull, thrust and the layout of tables are taken from.
+    name
+        Name of the vessel; of the log's folder where empty.
+    file
+        Where to; ``vessel.toml`` beside the log where None, nowhere where it is ``-``.
+    overwrite
+        Replace a file that is there.
+    ask
+        Asks a person for what no log shows; what is not asked is a marked line.
+    progress
+        Called with the name of each stage.
+
+    Returns
+    -------
+    tuple
+        The result for JSON, an account of it as text, and the profile's text.
+
+    Raises
+    ------
+    FerryIdError
+        For a log of which no profile can be drafted, an answer that is none, and a file that is there.
+    """
+    folder = log_folder(log)
+    place = folder / VESSEL_FILE if file is None else file
+    if str(place) != "-" and place.exists() and not overwrite:
+        raise FerryIdError(f"{place}: is there already. Fix: give --file another name, or --overwrite")
+    named = name or re.sub(r"[^A-Za-z0-9._-]+", "-", folder.name).strip("-._") or "vessel"
+    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", named):
+        raise FerryIdError(f'--name: cannot be "{name}". Fix: use letters, digits, ".", "-" and "_" only')
+    progress("reading the log")
+    draft = draft_profile(log, like)
+    progress("")
+    values = {}
+    for question in questions(draft) if ask is not None else ():
+        answer = ask(question) if ask is not None else ""
+        if not question.accepts(answer):
+            raise FerryIdError(
+                f"{question.key}: {answer!r} does not answer it ({question.text}). Fix: answer it, or with nothing"
+            )
+        values[question.key] = answer
+    text = draft_text(draft, Answers(named, values))
+    if str(place) != "-":
+        with replacing(place, new=not overwrite) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+    return as_json(draft, str(place), text), as_text(draft, str(place), text), text

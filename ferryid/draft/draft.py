@@ -1,0 +1,182 @@
+"""Drafting a profile: look at names, read what may be of use, compare it, choose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from ferryid.draft.actuator_fields import actuator_fields
+from ferryid.draft.actuators import UNKNOWN_ORDER, DraftedActuator, drafted_actuators
+from ferryid.draft.fields import navigation_groups
+from ferryid.draft.kinematics import MappedSignal, navigation_signals
+from ferryid.draft.samples import read_samples
+from ferryid.draft.wind import wind_fields, wind_signal
+from ferryid.errors import FerryIdError
+from ferryid.ingest import open_log
+from ferryid.ingest.log import Topic
+from ferryid.vessel.field_words import words_of
+from ferryid.vessel.profile import Profile
+
+
+@dataclass(frozen=True)
+class Draft:
+    """What a log shows of a vessel.
+
+    Attributes
+    ----------
+    log
+        Its path.
+    signals
+        Pose, velocity, yaw rate, wind and what a controller asked for.
+    actuators
+        With their signals.
+    like
+        The profile that hull, thrust and areas are taken from, where one was given.
+    notes
+        How the log was read, as sentences.
+    unused
+        Topics of which nothing is mapped.
+    """
+
+    log: str
+    signals: tuple[MappedSignal, ...]
+    actuators: tuple[DraftedActuator, ...]
+    like: Profile | None
+    notes: tuple[str, ...]
+    unused: tuple[str, ...]
+
+    @property
+    def every(self) -> tuple[MappedSignal, ...]:
+        """All signals, those of actuators included."""
+        return (*self.signals, *(signal for one in self.actuators for signal in one.signals))
+
+
+def draft_profile(log: str | Path, like: Profile | None = None) -> Draft:
+    """Draft a profile from a log.
+
+    Parameters
+    ----------
+    log
+        Path; parts of one recording joined by ``+``.
+    like
+        A profile that hull, thrust and the layout of tables are taken from; signals are looked for in any case.
+
+    Raises
+    ------
+    FerryIdError
+        For a log that cannot be read, one whose columns have no names, and one without anything that could be a heading or a
+        velocity, or without an actuator.
+    """
+    reader = open_log(log, None if like is None else like.table)
+    topics = reader.topics
+    groups, fields, winds = navigation_groups(topics), actuator_fields(topics), wind_fields(topics)
+    if not groups and not fields and any("named by their place" in topic.note for topic in topics):
+        raise FerryIdError(
+            f"{log}: its columns have no names, so that nothing shows what they are. Fix: add a header row, or give --like a "
+            "profile whose [table] has columns"
+        )
+    wanted: dict[str, list[str]] = {}
+    for group in groups:
+        wanted.setdefault(group.topic, []).extend(group.fields)
+    for field in fields:
+        wanted.setdefault(field.topic, []).append(field.path)
+    for topic, speed, direction in winds:
+        wanted.setdefault(topic, []).extend((speed, direction))
+    if not wanted:
+        raise FerryIdError(
+            f"{log}: {_nothing(topics)}. Fix: write the signal map by hand, see ferryid vessel show --toml"
+        )
+    samples = read_samples(reader, wanted)
+    signals, motion = navigation_signals(groups, samples)
+    if not signals:
+        raise FerryIdError(
+            f"{log}: no field looks like a heading that changes, found {_listed([one.label for one in groups])}. Fix: record "
+            "the heading, or write the signal map by hand, see ferryid vessel show --toml"
+        )
+    actuators = drafted_actuators(fields, samples, motion)
+    if not actuators:
+        raise FerryIdError(
+            f"{log}: no field looks like an actuator's speed, angle, force or order, found the topics "
+            f"{_listed([one.name for one in topics])}. Fix: record the orders, or write the signal map by hand"
+        )
+    wind = wind_signal(winds, samples, motion)
+    every = [*signals, *([] if wind is None else [wind]), *_tau_d(topics)]
+    if like is not None:
+        actuators = [with_orders(one, like) for one in _named_like(actuators, like)]
+    used = {signal.topic for one in actuators for signal in one.signals} | {signal.topic for signal in every}
+    notes = tuple(
+        dict.fromkeys(note for topic in topics if topic.name in used for note in topic.note.split("; ") if note)
+    )
+    return Draft(
+        str(log), tuple(every), tuple(actuators), like, notes, tuple(t.name for t in topics if t.name not in used)
+    )
+
+
+def _nothing(topics: Sequence[Topic]) -> str:
+    return f"no topic has a name of pose, velocity, heading or actuator, found {_listed([one.name for one in topics])}"
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names[:8]) + (", ..." if len(names) > 8 else "") if names else "none"
+
+
+def _tau_d(topics: Sequence[Topic]) -> list[MappedSignal]:
+    """Return the forces that a controller asked for."""
+    for topic in topics:
+        words, fields = set(words_of(topic.name)), set(topic.fields)
+        stem = next((path.removesuffix("force.x") for path in fields if path.endswith("force.x")), None)
+        if (
+            stem is None
+            or not {"tau", "wrench"} & words
+            or not {"d", "desired", "cmd", "command"} & words
+            or topic.count < 2
+        ):
+            continue
+        three = (f"{stem}force.x", f"{stem}force.y", f"{stem}torque.z")
+        if set(three) <= fields:
+            why = ("forces and a moment that a controller asked for, by its name",)
+            options = (("moment_unit", "N*m"),)
+            return [MappedSignal("tau_d", topic.name, three, "N", "FRD", 1.0, why, ("its frame is assumed",), options)]
+    return []
+
+
+def with_orders(actuator: DraftedActuator, like: Profile) -> DraftedActuator:
+    """Return an actuator whose signals are orders where a profile has them as orders, and the log's names do not state it."""
+    known = {signal.quantity for signal in like.signals}
+    return replace(
+        actuator,
+        signals=tuple(
+            as_order(signal)
+            if UNKNOWN_ORDER in signal.doubts and signal.quantity not in known and f"{signal.quantity}.command" in known
+            else signal
+            for signal in actuator.signals
+        ),
+    )
+
+
+def as_order(signal: MappedSignal) -> MappedSignal:
+    """Return the signal of an actuator as an order."""
+    doubts = tuple(one for one in signal.doubts if one != UNKNOWN_ORDER)
+    return replace(signal, quantity=f"{signal.quantity}.command", doubts=doubts)
+
+
+def _named_like(actuators: Sequence[DraftedActuator], like: Profile) -> list[DraftedActuator]:
+    """Return actuators under the names that a profile gives them: of the same name, or else of the same kind in order."""
+    free = [one for one in like.actuators if one.name not in {other.name for other in actuators}]
+    named = {one.name for one in like.actuators}
+    found = []
+    for one in actuators:
+        if one.name in named:
+            found.append(one)
+            continue
+        twin = next((other for other in free if other.kind == one.kind), None)
+        if twin is None:
+            found.append(one)
+            continue
+        free.remove(twin)
+        signals = tuple(
+            replace(signal, quantity=f"{twin.name}.{signal.quantity.partition('.')[2]}") for signal in one.signals
+        )
+        found.append(replace(one, name=twin.name, signals=signals))
+    return found

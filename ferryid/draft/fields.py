@@ -1,0 +1,257 @@
+"""Which fields of a log may be pose, velocity, heading, rates, wind and actuators, by their names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from ferryid.ingest.log import Topic
+from ferryid.vessel.field_words import words_of
+
+_NUMBERS = ("float", "double", "int", "uint", "real")
+ORDERS = frozenset(
+    {
+        "ref",
+        "reference",
+        "desired",
+        "des",
+        "setpoint",
+        "sp",
+        "target",
+        "goal",
+        "cmd",
+        "command",
+        "commanded",
+        "order",
+        "input",
+    }
+)
+_NO_MEASUREMENT = frozenset(
+    [
+        "error",
+        "err",
+        "covariance",
+        "cov",
+        "variance",
+        "std",
+        "accuracy",
+        "dop",
+        "hdop",
+        "offset",
+        "bias",
+        "waypoint",
+        "simulated",
+        "predicted",
+        "planned",
+        "header",
+        "seq",
+        "stamp",
+        "secs",
+        "nsecs",
+        "sec",
+        "nanosec",
+        "date",
+        "status",
+        "id",
+        "temp",
+        "temperature",
+        "accel",
+        "acceleration",
+        "accl",
+        "acc",
+        "magn",
+        "mag",
+        "magnetic",
+        "field",
+        "jerk",
+        "altitude",
+        "height",
+        "camera",
+        "image",
+        "battery",
+        "power",
+        "voltage",
+        "supply",
+        "current",
+        "water",
+        "wave",
+        "waves",
+        "payload",
+        "weather",
+    ]
+)
+PLACE = frozenset({"position", "pos", "translation", "point", "location", "pose", "odom", "odometry", "place"})
+SPEEDS = frozenset({"linear", "velocity", "velo", "vel", "twist", "speed", "velocities"})
+RATES = frozenset({"angular", "gyro", "gyroscope", "omega", "rates", "angvelo", "rate", "angvel", "yawrate", "zgyro"})
+HEADING = frozenset({"heading", "hdg", "yaw", "psi", "compass", "hdt"})
+_QUATERNION = frozenset({"orientation", "rotation", "quaternion", "heading", "attitude"})
+ACTUATORS = frozenset(
+    [
+        "thruster",
+        "thrusters",
+        "motor",
+        "propeller",
+        "prop",
+        "rudder",
+        "azimuth",
+        "azi",
+        "rpm",
+        "pwm",
+        "lpwm",
+        "rpwm",
+        "throttle",
+        "thrust",
+        "actuator",
+        "actuators",
+        "esc",
+        "steering",
+        "nozzle",
+        "pod",
+        "delta",
+        "servo",
+        "outboard",
+        "engine",
+    ]
+)
+_PAIRS: Mapping[str, tuple[tuple[str, str], ...]] = {
+    "position": (("n", "e"), ("north", "east"), ("northing", "easting"), ("xn", "yn")),
+    "velocity": (
+        ("u", "v"),
+        ("u", "vm"),
+        ("vx", "vy"),
+        ("vn", "ve"),
+        ("surge", "sway"),
+        ("velx", "vely"),
+        ("vnorth", "veast"),
+    ),
+}
+
+
+@dataclass(frozen=True)
+class FieldGroup:
+    """Fields of one topic that may be one quantity.
+
+    Attributes
+    ----------
+    kind
+        ``position``, ``heading``, ``velocity`` or ``yaw_rate``.
+    topic, fields
+        Where it is.
+    form
+        ``geodetic`` (latitude first), ``quaternion``, or empty.
+    rate_hz
+        Messages per second, of the whole log.
+    """
+
+    kind: str
+    topic: str
+    fields: tuple[str, ...]
+    form: str = ""
+    rate_hz: float = 0.0
+
+    @property
+    def label(self) -> str:
+        """Topic and fields."""
+        return f"{self.topic}: {', '.join(self.fields)}"
+
+
+def numeric_fields(topic: Topic) -> dict[str, tuple[str, ...]]:
+    """Return the numbers of a topic with the words of their names."""
+    found = {}
+    for path, kind in topic.fields.items():
+        # In messages these are arrays, in tables units.
+        if kind.startswith(_NUMBERS) and (topic.encoding == "table" or not path.endswith("]")):
+            found[path] = words_of(path)
+    return found
+
+
+def rate_of(topic: Topic) -> float:
+    """Return messages per second of a topic; 0 where it has no length."""
+    if topic.start_ns is None or topic.end_ns is None or topic.end_ns <= topic.start_ns:
+        return 0.0
+    return (topic.count - 1) / ((topic.end_ns - topic.start_ns) * 1e-9)
+
+
+def navigation_groups(topics: Sequence[Topic]) -> list[FieldGroup]:
+    """Return what may be the vessel's own pose, heading, velocity and yaw rate; orders, errors and devices are none."""
+    found: list[FieldGroup] = []
+    for topic in topics:
+        around = set(words_of(topic.name)) if topic.name != "table" else set[str]()
+        if topic.count < 2 or around & (ORDERS | _NO_MEASUREMENT | ACTUATORS) or "wind" in around:
+            continue
+        fields = {
+            path: words
+            for path, words in numeric_fields(topic).items()
+            if not set(words) & (ORDERS | _NO_MEASUREMENT | ACTUATORS | {"wind", "wrench", "force", "torque"})
+        }
+        found += _of_topic(topic, around, fields)
+    return found
+
+
+def _of_topic(topic: Topic, around: set[str], fields: Mapping[str, tuple[str, ...]]) -> list[FieldGroup]:
+    groups: dict[tuple[str, ...], dict[str, str]] = {}
+    for path, words in fields.items():
+        axis, stem = _axis(words)
+        groups.setdefault(stem, {}).setdefault(axis, path)
+    # Columns of a table share no stem: what names the axes of one vector lies in several.
+    table = topic.encoding == "table"
+    every = {axis: path for axes in groups.values() for axis, path in reversed(axes.items())}
+    found: list[tuple[str, tuple[str, ...], str]] = []
+    for stem, axes in groups.items():
+        what = set(stem) | around
+        if {"x", "y", "z", "w"} <= axes.keys() and what & _QUATERNION:
+            found.append(("heading", tuple(axes[one] for one in "xyzw"), "quaternion"))
+            continue
+        found += _vectors(topic, what, set(stem), axes)
+    for kind, pairs in _PAIRS.items():
+        for first, second in pairs:
+            if {first, second} <= every.keys():
+                found.append((kind, (every[first], every[second]), ""))
+                break
+    if {"latitude", "longitude"} <= every.keys() or {"lat", "lon"} <= every.keys():
+        names = ("latitude", "longitude") if "latitude" in every else ("lat", "lon")
+        found.append(("position", (every[names[0]], every[names[1]]), "geodetic"))
+    alone = len(fields) == 1
+    for path, words in fields.items():
+        said = set(words) | (around if alone else set())
+        if (said & HEADING and not said & RATES and words[-1] not in ("x", "y", "z", "w", "d", "dot", "rate")) or (
+            words[-1] == "theta" and {"x", "y"} <= every.keys() and not {"psi", "yaw", "phi"} & every.keys()
+        ):
+            found.append(("heading", (path,), ""))
+        elif (said & RATES and (said & HEADING or words[0] in ("r", "z") or "zgyro" in said)) or words == ("r",):
+            found.append(("yaw_rate", (path,), ""))
+    bare = {words[0]: path for path, words in fields.items() if len(words) == 1}
+    if table and {"x", "y"} <= bare.keys() and not any(kind == "position" for kind, _, _ in found):
+        found.append(("position", (bare["x"], bare["y"]), ""))
+    rate = rate_of(topic)
+    return [FieldGroup(kind, topic.name, paths, form, rate) for kind, paths, form in dict.fromkeys(found)]
+
+
+def _vectors(
+    topic: Topic, what: set[str], stem: set[str], axes: Mapping[str, str]
+) -> Iterable[tuple[str, tuple[str, ...], str]]:
+    """Yield what the axes x, y, z under one stem may be."""
+    if not {"x", "y"} <= axes.keys():
+        if "z" in axes and what & RATES:
+            yield "yaw_rate", (axes["z"],), ""
+        return
+    if stem & RATES:
+        if "z" in axes:
+            yield "yaw_rate", (axes["z"],), ""
+    elif stem & SPEEDS or (what & SPEEDS and not stem & PLACE):
+        yield "velocity", (axes["x"], axes["y"]), ""
+        # A vector of three that names no angular part may hold the yaw rate in its third place: motion decides.
+        if "z" in axes and not any(set(words_of(path)) & RATES for path in topic.fields):
+            yield "yaw_rate", (axes["z"],), ""
+    elif what & PLACE or {"theta", "psi", "yaw"} & axes.keys():
+        yield "position", (axes["x"], axes["y"]), ""
+
+
+def _axis(words: tuple[str, ...]) -> tuple[str, tuple[str, ...]]:
+    """Return the word that names an axis, the last or else the first, and the others."""
+    short = {"x", "y", "z", "w", "n", "e", "u", "v", "r", "vm", "psi", "theta"}
+    if (words and words[-1] in short) or len(words) < 2:
+        return (words[-1] if words else ""), words[:-1]
+    if words[0] in short:
+        return words[0], words[1:]
+    return words[-1], words[:-1]

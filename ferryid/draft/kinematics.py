@@ -1,0 +1,403 @@
+"""Units, frames and signs of pose, heading, velocity and yaw rate, from how they move together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from math import log
+
+import numpy as np
+
+from ferryid.draft.fields import FieldGroup
+from ferryid.draft.samples import Samples, metres, yaw
+from ferryid.draft.thresholds import DRAFT
+from ferryid.types import Flags, Floats
+from ferryid.vessel.field_words import unit_of_name, words_of
+from ferryid.vessel.frames import to_body
+from ferryid.vessel.units import KINDS
+
+_BODY = ("FRD", "FLU")
+_WORLD = ("NED", "ENU")
+_SPEED_UNITS = ("m/s", "km/h", "kn", "ft/s")
+_RATE_UNITS = ("rad/s", "deg/s", "deg/min")
+
+
+@dataclass(frozen=True)
+class MappedSignal:
+    """One entry of a drafted signal map.
+
+    Attributes
+    ----------
+    quantity, topic, fields, unit, frame, sign
+        As of `ferryid.vessel.profile.Signal`.
+    evidence
+        What the log shows for unit, frame and sign, a sentence each.
+    doubts
+        What a person has to check, a sentence each.
+    """
+
+    quantity: str
+    topic: str
+    fields: tuple[str, ...]
+    unit: str
+    frame: str = ""
+    sign: float = 1.0
+    evidence: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
+    options: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True)
+class Motion:
+    """How the vessel moves, on the grid: velocity ahead and to starboard [m/s], yaw rate [rad/s], heading [rad]; or NaN."""
+
+    u: Floats
+    v: Floats
+    r: Floats
+    psi: Floats
+
+
+@dataclass(frozen=True)
+class _Pose:
+    """One position with one heading: velocity over ground in the frames assumed [m/s], heading [rad]."""
+
+    position: FieldGroup | None
+    heading: FieldGroup
+    position_frame: str
+    heading_frame: str
+    heading_unit: str
+    north: Floats
+    east: Floats
+    psi: Floats
+
+    @property
+    def usual(self) -> int:
+        """Number of frames that are not NED."""
+        return (self.position_frame == "ENU") + (self.heading_frame == "ENU")
+
+
+@dataclass(frozen=True)
+class _Agreement:
+    """How a velocity agrees with a pose: share of it that the pose explains, its frame and gain."""
+
+    share: float
+    frame: str
+    gain: float
+    sway: float
+    velocity: FieldGroup | None
+    pose: _Pose
+
+
+def navigation_signals(groups: Sequence[FieldGroup], samples: Samples) -> tuple[list[MappedSignal], Motion]:
+    """Return the signals of pose, velocity and yaw rate that agree best, and the motion that they show."""
+    groups = [one for one in groups if samples.has(one.topic, one.fields)]
+    chosen = _best(groups, samples)
+    unknown = np.full(samples.grid_s.shape, np.nan)
+    if chosen is None:
+        return [], Motion(unknown, unknown, unknown, unknown)
+    pose, velocity = chosen.pose, chosen.velocity
+    slope = samples.slope(pose.psi, pose.heading.topic)
+    motion_u, motion_v = to_body(pose.north, pose.east, pose.psi)
+    named = _named_frame(pose)
+    found = []
+    if pose.position is not None:
+        found.append(_position(pose, chosen, named))
+    found.append(_heading(pose, chosen, slope, named))
+    if velocity is not None:
+        found.append(_velocity(velocity, chosen))
+        if chosen.frame in _BODY:
+            scale = KINDS["speed"][found[-1].unit]
+            first, second = (_smoothed(samples, velocity, place) * scale for place in (0, 1))
+            motion_u, motion_v = first, second if chosen.frame == "FRD" else -second
+    rate = _yaw_rate(groups, samples, slope, pose.heading)
+    if rate is not None:
+        found.append(rate)
+    return found, Motion(motion_u, motion_v, slope, pose.psi)
+
+
+def _smoothed(samples: Samples, group: FieldGroup, place: int) -> Floats:
+    return samples.smooth(samples.on_grid(group.topic, samples.raw(group.topic, group.fields[place])), group.topic)
+
+
+def _of_kind(groups: Sequence[FieldGroup], kind: str) -> list[FieldGroup]:
+    """Return the groups of a kind but those that are much slower than the fastest."""
+    some = [one for one in groups if one.kind == kind]
+    fastest = max((one.rate_hz for one in some), default=0.0)
+    return [one for one in some if one.rate_hz >= DRAFT.slower * fastest][: DRAFT.most_sources]
+
+
+def _best(groups: Sequence[FieldGroup], samples: Samples) -> _Agreement | None:
+    """Return the position, heading and velocity that agree best, and in which frames; names decide where motion does not."""
+    headings = _of_kind(groups, "heading")
+    positions: list[FieldGroup | None] = [*_of_kind(groups, "position")]
+    velocities: list[FieldGroup | None] = [*_of_kind(groups, "velocity")]
+    if not headings:
+        return None
+    poses = [
+        pose
+        for position, heading in product(positions or [None], headings)
+        for pose in _poses(position, heading, samples)
+    ]
+    found = [_agreement(pose, velocity, samples) for pose, velocity in product(poses, velocities or [None])]
+    top = max(one.share for one in found)
+    near = [one for one in found if one.share >= top - DRAFT.even]
+    best = min(near, key=_preference)
+    if best.frame not in _WORLD:
+        return best
+    # A velocity over ground shows nothing of the heading: any that is along the hull does, and else motion along it.
+    same = [
+        one for one in near
+        if (one.frame, one.velocity, one.pose.position_frame, one.pose.position) ==
+        (best.frame, best.velocity, best.pose.position_frame, best.pose.position)
+    ]  # fmt: skip
+    others = [one for one in groups if one.kind == "velocity" and one != best.velocity]
+    seen = [max((_along_hull(one.pose, other, samples) for other in others), default=0.0) for one in same]
+    if max(seen) < DRAFT.agrees:
+        seen = [_along(one.pose) for one in same]
+    return same[int(np.argmax(seen))]
+
+
+def _along_hull(pose: _Pose, velocity: FieldGroup, samples: Samples) -> float:
+    """Return which share of a velocity a pose explains if it is along the hull."""
+    first, second = (_smoothed(samples, velocity, place) for place in (0, 1))
+    ahead, aside = to_body(pose.north, pose.east, pose.psi)
+    return max(_explained(first, second, ahead, aside)[0], _explained(first, second, ahead, -aside)[0])
+
+
+def _preference(one: _Agreement) -> tuple[float, ...]:
+    """Return what comes first among what agrees alike: frames that names state, sources of one topic, NED."""
+    pose = one.pose
+    stated = _named_frame(pose)
+    frames = [
+        pose.heading_frame,
+        *([pose.position_frame] if pose.position is not None and not pose.position.form else []),
+    ]
+    against = sum(bool(stated) and frame != stated for frame in frames)
+    apart = sum(pose.position is not None and pose.position.topic != pose.heading.topic for _ in (0,))
+    named = -sum("ned" in words_of(group.topic) for group in (pose.position, pose.heading) if group is not None)
+    return against, apart, named, pose.usual, one.frame == "FLU", -one.share
+
+
+def _named_frame(pose: _Pose) -> str:
+    """Return the frame that a topic's or field's name states, or an empty string."""
+    for group in (pose.position, pose.heading):
+        if group is not None:
+            words = {word for name in (group.topic, *group.fields) for word in words_of(name)}
+            if "enu" in words:
+                return "ENU"
+            if "ned" in words:
+                return "NED"
+            if group is pose.position and {"n", "e"} <= words:
+                return "NED"
+    return ""
+
+
+def _poses(position: FieldGroup | None, heading: FieldGroup, samples: Samples) -> list[_Pose]:
+    """Return a position and a heading in every frame that they may be in."""
+    unit = "quaternion" if heading.form else _angle_unit(heading, samples)
+    angle = samples.smooth(
+        samples.on_grid(heading.topic, yaw(samples, heading.topic, heading.fields, unit)), heading.topic
+    )
+    unknown = np.full(samples.grid_s.shape, np.nan)
+    if position is None:
+        sides = [("", unknown, unknown)]
+    elif position.form == "geodetic":
+        slopes = [
+            samples.slope(samples.on_grid(position.topic, one), position.topic)
+            for one in metres(samples, position.topic, position.fields)
+        ]
+        sides = [("geodetic", slopes[0], slopes[1])]
+    else:
+        first, second = (
+            samples.slope(samples.on_grid(position.topic, samples.raw(position.topic, path)), position.topic)
+            for path in position.fields
+        )
+        sides = [("NED", first, second), ("ENU", second, first)]
+    return [
+        _Pose(position, heading, frame, other, unit, north, east, 0.5 * np.pi - angle if other == "ENU" else angle)
+        for (frame, north, east), other in product(sides, _WORLD)
+    ]
+
+
+def _angle_unit(heading: FieldGroup, samples: Samples) -> str:
+    stated = unit_of_name(heading.fields[0], "angle")
+    if stated:
+        return stated
+    words = set(words_of(heading.fields[0])) | set(words_of(heading.topic))
+    if words & {"deg", "degrees", "degree"}:
+        return "deg"
+    values = samples.raw(heading.topic, heading.fields[0])
+    known = values[np.isfinite(values)]
+    return "deg" if known.size and float(np.quantile(np.abs(known), 0.99)) > DRAFT.most_rad else "rad"
+
+
+def _agreement(pose: _Pose, velocity: FieldGroup | None, samples: Samples) -> _Agreement:
+    """Return how a velocity agrees with a pose; without a velocity, how steadily the vessel moves along its heading."""
+    if velocity is None:
+        return _Agreement(_along(pose), "", 1.0, 0.0, None, pose)
+    first, second = (_smoothed(samples, velocity, place) for place in (0, 1))
+    ahead, aside = to_body(pose.north, pose.east, pose.psi)
+    best = _Agreement(-1.0, "FRD", 1.0, 0.0, velocity, pose)
+    for frame in (*_BODY, *_WORLD):
+        x, y = (ahead, aside) if frame in _BODY else (pose.north, pose.east)
+        x, y = {"FLU": (x, -y), "ENU": (y, x)}.get(frame, (x, y))
+        share, gain, sway = _explained(first, second, x, y)
+        if share > best.share + (DRAFT.even if frame in _WORLD or frame == "FLU" else 0.0):
+            best = _Agreement(share, frame, gain, sway, velocity, pose)
+    if pose.position is None:
+        return _Agreement(0.0, "FRD", 1.0, 0.0, velocity, pose)
+    return best
+
+
+def _explained(first: Floats, second: Floats, x: Floats, y: Floats) -> tuple[float, float, float]:
+    """Return which share of a measured vector another explains, with what gain, and the correlation of their second parts."""
+    rows = np.isfinite(first + second + x + y)
+    rows &= _usual(np.hypot(x, y), rows)
+    if np.count_nonzero(rows) < DRAFT.fewest_rows:
+        return 0.0, 1.0, 0.0
+    both = float(x[rows] @ x[rows] + y[rows] @ y[rows])
+    gain = float(first[rows] @ x[rows] + second[rows] @ y[rows]) / both if both > 0.0 else 0.0
+    if gain <= 0.0:
+        return 0.0, 1.0, 0.0
+    error = np.hypot(first - x * gain, second - y * gain)
+    rows &= error <= np.quantile(error[rows], 0.95)
+    total = float(np.sum(first[rows] ** 2 + second[rows] ** 2))
+    share = 1.0 - float(np.sum(error[rows] ** 2)) / total if total > 0.0 else 0.0
+    return share, gain, _correlation(second[rows], y[rows])
+
+
+def _usual(size: Floats, rows: Flags) -> Flags:
+    """True where a speed is not that of a jump of the position."""
+    usual = float(np.quantile(size[rows], 0.9)) if rows.any() else np.inf
+    return np.asarray(size <= DRAFT.jump * max(usual, 1e-9))
+
+
+def _correlation(a: Floats, b: Floats) -> float:
+    rows = np.isfinite(a + b)
+    if np.count_nonzero(rows) < DRAFT.fewest_rows or np.ptp(a[rows]) == 0.0 or np.ptp(b[rows]) == 0.0:
+        return 0.0
+    return float(np.corrcoef(a[rows], b[rows])[0, 1])
+
+
+def _along(pose: _Pose) -> float:
+    """Return how nearly the vessel moves along its heading: 1 always, 0 in all directions alike."""
+    speed = np.hypot(pose.north, pose.east)
+    rows = np.isfinite(speed + pose.psi)
+    if not rows.any():
+        return 0.0
+    rows &= _usual(speed, rows)
+    rows &= speed > DRAFT.moving * float(np.quantile(speed[rows], 0.95)) if rows.any() else rows
+    if np.count_nonzero(rows) < DRAFT.fewest_rows:
+        return 0.0
+    course = np.arctan2(pose.east[rows], pose.north[rows])
+    return float(np.mean(np.cos(course - pose.psi[rows])))
+
+
+def nearest_unit(gain: float, kind: str, units: Sequence[str]) -> tuple[str, float]:
+    """Return the unit whose factor explains a gain of recorded over SI best, and the gain in that unit."""
+    unit = min(units, key=lambda one: abs(log(max(gain, 1e-12) * KINDS[kind][one])))
+    return unit, gain * KINDS[kind][unit]
+
+
+def _position(pose: _Pose, chosen: _Agreement, named: str) -> MappedSignal:
+    position = pose.position
+    assert position is not None
+    if position.form == "geodetic":
+        unit = "deg"
+        return MappedSignal(
+            "position", position.topic, position.fields, unit, "geodetic", 1.0, ("latitude and longitude",)
+        )
+    return MappedSignal(
+        "position",
+        position.topic,
+        position.fields,
+        "m",
+        pose.position_frame,
+        1.0,
+        (_shown(chosen),),
+        _mirror(pose, named),
+    )
+
+
+def _shown(chosen: _Agreement) -> str:
+    if chosen.velocity is None:
+        return f"the vessel moves along its heading (mean cosine {chosen.share:.2f})"
+    return (
+        f"its slope{', turned by the heading, ' if chosen.frame in _BODY else ''}explains {100 * chosen.share:.0f} % of "
+        f"{chosen.velocity.label}, gain {chosen.gain:.3g}"
+    )
+
+
+def _mirror(pose: _Pose, named: str) -> tuple[str, ...]:
+    """Return that motion alone does not tell a chart from its mirror image, unless a name or a geodetic position does."""
+    if named or (pose.position is not None and pose.position.form == "geodetic"):
+        return ()
+    return (
+        "motion alone does not tell NED and FRD from their mirror image ENU and FLU: in a turn to starboard the heading rises",
+    )
+
+
+def _heading(pose: _Pose, chosen: _Agreement, slope: Floats, named: str) -> MappedSignal:
+    known = slope[np.isfinite(slope)]
+    turned = float(np.degrees(np.quantile(np.abs(known), 0.99))) if known.size else 0.0
+    evidence = [f"the vessel moves along it (mean cosine {_along(pose):.2f}), turning at up to {turned:.1f} deg/s"]
+    return MappedSignal(
+        "heading", pose.heading.topic, pose.heading.fields, pose.heading_unit, pose.heading_frame, 1.0, tuple(evidence),
+        _mirror(pose, named),
+    )  # fmt: skip
+
+
+def _velocity(velocity: FieldGroup, chosen: _Agreement) -> MappedSignal:
+    stated = unit_of_name(velocity.fields[0], "speed")
+    unit, left = (
+        (stated, chosen.gain * KINDS["speed"][stated]) if stated else nearest_unit(chosen.gain, "speed", _SPEED_UNITS)
+    )
+    evidence = f"the position's slope explains {100 * chosen.share:.0f} % of it, with {left:.2f} of its size in {unit}"
+    doubts = []
+    if chosen.pose.position is not None and chosen.share < DRAFT.agrees:
+        doubts.append(
+            "pose and velocity do not agree in any frame: another topic may be right, or the log is too short"
+        )
+    if chosen.pose.position is None:
+        evidence = "no position to compare it with"
+        doubts.append("unit and frame are assumed")
+    elif abs(log(max(left, 1e-3))) > DRAFT.gain:
+        doubts.append(f"it is {left:.2f} times the position's slope, which no unit explains")
+    if chosen.frame in _BODY and abs(chosen.sway) < DRAFT.seen:
+        doubts.append(
+            f"sway is too small to show its sign (correlation {chosen.sway:.2f}): positive to starboard is assumed"
+        )
+    elif chosen.frame in _BODY:
+        evidence += f"; sway with a correlation of {chosen.sway:.2f}"
+    return MappedSignal(
+        "velocity", velocity.topic, velocity.fields, unit, chosen.frame, 1.0, (evidence,), tuple(doubts)
+    )
+
+
+def _yaw_rate(
+    groups: Sequence[FieldGroup], samples: Samples, slope: Floats, heading: FieldGroup
+) -> MappedSignal | None:
+    """Return the yaw rate that follows the slope of the heading best; None where none does, or only slow ones."""
+    best: tuple[float, FieldGroup, float] | None = None
+    for group in groups:
+        if group.kind != "yaw_rate" or group.rate_hz < DRAFT.slower * heading.rate_hz:
+            continue
+        rate = _smoothed(samples, group, 0)
+        rows = np.isfinite(rate + slope)
+        if np.count_nonzero(rows) < DRAFT.fewest_rows:
+            continue
+        rows &= np.abs(slope) <= DRAFT.jump * max(float(np.quantile(np.abs(slope[rows]), 0.9)), 1e-9)
+        seen = _correlation(rate[rows], slope[rows])
+        power = float(slope[rows] @ slope[rows])
+        gain = float(rate[rows] @ slope[rows]) / power if power > 0.0 else 0.0
+        same = group.topic == heading.topic
+        if best is None or abs(seen) + 0.02 * same > abs(best[0]) + 0.02 * (best[1].topic == heading.topic):
+            best = seen, group, gain
+    if best is None or abs(best[0]) < DRAFT.seen_rate:
+        return None
+    seen, group, gain = best
+    stated = unit_of_name(group.fields[0], "rate")
+    unit, left = (stated, abs(gain) * KINDS["rate"][stated]) if stated else nearest_unit(abs(gain), "rate", _RATE_UNITS)
+    evidence = f"follows the slope of the heading (correlation {seen:.2f}) with {left:.2f} of its size in {unit}"
+    return MappedSignal("yaw_rate", group.topic, group.fields, unit, "FRD" if gain > 0.0 else "FLU", 1.0, (evidence,))

@@ -1,0 +1,139 @@
+"""Fields of a log on one grid, smoothed, for comparing them with each other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ferryid.errors import FerryIdError
+from ferryid.ingest.clocks import repair_all
+from ferryid.ingest.log import Reader, Series
+from ferryid.types import Floats
+from ferryid.vessel.frames import local_north_east, yaw_of_quaternion
+
+GRID_HZ = 5.0
+MOST_ROWS = 20_000
+SMOOTHED_S = 1.5
+_SMOOTHED_PERIODS = 5.0
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Fields of a log at their own times.
+
+    Attributes
+    ----------
+    times_s
+        By topic, from the first row of any [s].
+    columns
+        By topic and field, as recorded.
+    grid_s
+        Times of the grid [s], shape (n,).
+    start_ns
+        Time of the first row [ns].
+    """
+
+    times_s: Mapping[str, Floats]
+    columns: Mapping[tuple[str, str], Floats]
+    grid_s: Floats
+    start_ns: int
+
+    def has(self, topic: str, fields: Sequence[str]) -> bool:
+        """Tell whether fields are there, and one of them changes (a quaternion of yaw has two that do not)."""
+        if not all((topic, path) in self.columns for path in fields):
+            return False
+        changing = [np.unique(self.columns[topic, path]).size > 1 for path in fields]
+        return any(changing) if len(fields) == 4 else all(changing)
+
+    def raw(self, topic: str, path: str) -> Floats:
+        """Return a field as recorded, shape (m,)."""
+        return self.columns[topic, path]
+
+    def on_grid(self, topic: str, values: Floats, *, held: bool = False) -> Floats:
+        """Return values of a topic on the grid, NaN outside of it and across gaps."""
+        times = self.times_s[topic]
+        known = np.isfinite(values)
+        times, values = times[known], values[known]
+        if times.size < 2:
+            return np.full(self.grid_s.shape, np.nan)
+        if held:
+            place = np.clip(np.searchsorted(times, self.grid_s, side="right") - 1, 0, times.size - 1)
+            out = np.asarray(values[place], dtype=np.float64)
+        else:
+            out = np.interp(self.grid_s, times, values)
+            after = np.clip(np.searchsorted(times, self.grid_s), 1, times.size - 1)
+            wide = times[after] - times[after - 1] > 10.0 * float(np.median(np.diff(times)))
+            out[wide] = np.nan
+        outside = (self.grid_s < times[0]) | (self.grid_s > times[-1])
+        out[outside] = np.nan
+        return out
+
+    def smooth(self, values: Floats, topic: str) -> Floats:
+        """Return a moving mean over a window that suits the rate of a topic."""
+        period = float(np.median(np.diff(self.times_s[topic])))
+        step = float(self.grid_s[1] - self.grid_s[0])
+        rows = max(1, round(max(SMOOTHED_S, _SMOOTHED_PERIODS * period) / step)) | 1
+        kernel = np.ones(rows) / rows
+        return np.convolve(values, kernel, mode="same") if rows < values.size else values
+
+    def slope(self, values: Floats, topic: str) -> Floats:
+        """Return the slope of smoothed values [per s]."""
+        return np.asarray(np.gradient(self.smooth(values, topic), self.grid_s))
+
+
+def read_samples(reader: Reader, wanted: Mapping[str, Sequence[str]]) -> Samples:
+    """Read fields of a log and put their times on one clock.
+
+    Raises
+    ------
+    FerryIdError
+        Where none of them holds two rows.
+    """
+    series: dict[str, Series] = {}
+    for topic, fields in wanted.items():
+        try:
+            series |= reader.read({topic: tuple(dict.fromkeys(fields))})
+        except FerryIdError:
+            # What cannot be read maps nothing.
+            continue
+    repaired = repair_all(series)
+    times = {topic: time_ns for topic, (time_ns, rows, _) in repaired.items() if len(rows) > 1}
+    if not times:
+        raise FerryIdError("the log holds no field that could be a pose, a velocity or an actuator")
+    start = min(int(one[0]) for one in times.values())
+    columns = {}
+    for topic in times:
+        rows = repaired[topic][1]
+        for path, values in series[topic].columns.items():
+            if values.dtype.kind in "fiub":
+                columns[topic, path] = np.asarray(values, dtype=np.float64)[rows]
+    times_s = {topic: np.asarray((one - start) * 1e-9, dtype=np.float64) for topic, one in times.items()}
+    end = max(float(one[-1]) for one in times_s.values())
+    count = int(min(max(end * GRID_HZ, 2.0), MOST_ROWS))
+    return Samples(times_s, columns, np.linspace(0.0, end, count), start)
+
+
+def metres(samples: Samples, topic: str, fields: Sequence[str]) -> tuple[Floats, Floats]:
+    """Return north and east of latitudes and longitudes [m]."""
+    latitude, longitude = (samples.raw(topic, path).copy() for path in fields)
+    lost = (latitude == 0.0) & (longitude == 0.0)
+    turn = 1.0 if np.nanmax(np.abs(latitude)) <= 0.5 * np.pi else np.pi / 180.0
+    latitude[lost] = longitude[lost] = np.nan
+    north, east = np.full(latitude.shape, np.nan), np.full(latitude.shape, np.nan)
+    known = np.isfinite(latitude) & np.isfinite(longitude)
+    north[known], east[known] = local_north_east(latitude[known] * turn, longitude[known] * turn)
+    return north, east
+
+
+def yaw(samples: Samples, topic: str, fields: Sequence[str], unit: str) -> Floats:
+    """Return a heading as recorded [rad], continuous."""
+    if len(fields) == 4:
+        angle = yaw_of_quaternion(*(samples.raw(topic, path) for path in fields))
+    else:
+        angle = samples.raw(topic, fields[0]) * (np.pi / 180.0 if unit == "deg" else 1.0)
+    angle = np.asarray(angle, dtype=np.float64).copy()
+    known = np.isfinite(angle)
+    angle[known] = np.unwrap(angle[known])
+    return angle

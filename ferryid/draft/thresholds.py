@@ -1,0 +1,72 @@
+"""What decides in drafting a profile from a log."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ferryid.thresholds import threshold
+
+
+@dataclass(frozen=True)
+class DraftThresholds:
+    """Draft of a profile: which fields and frames are taken."""
+
+    slower: float = threshold(
+        0.4,
+        "of the fastest rate",
+        "sources that are slower are left out",
+        "convention: half, with room for lost messages",
+    )
+    most_sources: int = threshold(
+        6,
+        "sources",
+        "positions, headings and velocities that are tried in every combination",
+        "convention: 6³ is quick",
+    )
+    even: float = threshold(
+        0.02,
+        "of the variance",
+        "frames that explain a velocity as well as this are alike: names decide",
+        "convention: 2 %",
+    )
+    agrees: float = threshold(
+        0.5, "of the variance", "a velocity of which the pose explains less is a doubt", "convention: half"
+    )
+    most_rad: float = threshold(6.6, "rad", "an angle that goes beyond is in degrees", "derived: 2π and 5 % of it")
+    fewest_rows: int = threshold(50, "rows", "fewer show nothing", "convention: ten seconds of the grid")
+    jump: float = threshold(
+        3.0,
+        "of the speed that nine tenths of the rows do not exceed",
+        "faster is a jump of the position",
+        "convention: 3",
+    )
+    moving: float = threshold(
+        0.3, "of the speed that 95 % of the rows do not exceed", "slower rows show no course", "convention: a third"
+    )
+    gain: float = threshold(
+        0.15,
+        "of the logarithm",
+        "a gain farther from one is a doubt",
+        "convention: nearer than any two units, m/s and kn",
+    )
+    seen: float = threshold(
+        0.3, "correlation", "a sway less alike shows no sign", "convention: a tenth of the variance"
+    )
+    seen_rate: float = threshold(
+        0.6,
+        "correlation",
+        "what follows the slope of the heading less is no yaw rate",
+        "convention: a third of the variance",
+    )
+    acts: float = threshold(
+        0.2,
+        "correlation",
+        "an actuator whose effect is fainter does not show its sign",
+        "convention: 4 % of the variance",
+    )
+    most_rps: float = threshold(
+        60.0, "rev/s", "a propeller speed that goes beyond is in rpm", "convention: 3600 rpm, as large ones never turn"
+    )
+
+
+DRAFT = DraftThresholds()

@@ -1,0 +1,281 @@
+"""The text of a drafted profile: evidence beside each signal, and lines that a person has to fill in."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from ferryid.counts import counted
+from ferryid.draft.actuators import UNKNOWN_ORDER, DraftedActuator
+from ferryid.draft.draft import Draft, as_order
+from ferryid.draft.kinematics import MappedSignal
+from ferryid.vessel.profile import Actuator
+
+MARK = "# FILL IN:"
+"""How a line begins that a person has to complete."""
+
+
+@dataclass(frozen=True)
+class Question:
+    """What only a person knows: the key under which the answer is kept, the words, and what stands in the marked line."""
+
+    key: str
+    text: str
+    hint: str
+
+    def accepts(self, answer: str) -> bool:
+        """Tell whether a text answers it: a number, or a word that begins as one of its choices; or nothing."""
+        answer = answer.strip().lower()
+        if not answer:
+            return True
+        if self.key.endswith(".order"):
+            return answer[0] in "om"
+        try:
+            return math.isfinite(float(answer))
+        except ValueError:
+            return False
+
+
+@dataclass(frozen=True)
+class Answers:
+    """Name of the vessel, and answers to `questions` by their keys, as text."""
+
+    name: str
+    values: Mapping[str, str] = field(default_factory=dict)
+
+
+def open_lines(text: str) -> int:
+    """Return how many lines of a drafted profile a person has to complete."""
+    return sum(line.startswith(MARK) for line in text.splitlines())
+
+
+def as_json(draft: Draft, file: str, text: str) -> dict[str, Any]:
+    """Return a draft for JSON, schema ``ferryid.vessel-draft/1``."""
+    return {
+        "schema": "ferryid.vessel-draft/1",
+        "log": draft.log,
+        "file": file,
+        "like": None if draft.like is None else draft.like.name,
+        "fill_in": open_lines(text),
+        "actuators": [{"name": one.name, "kind": one.kind} for one in draft.actuators],
+        "signals": [
+            {
+                "quantity": one.quantity,
+                "topic": one.topic,
+                "fields": list(one.fields),
+                "unit": one.unit,
+                "frame": one.frame,
+                "sign": one.sign,
+                "evidence": list(one.evidence),
+                "check": list(one.doubts),
+                **dict(one.options),
+            }
+            for one in draft.every
+        ],
+        "unused": list(draft.unused),
+    }
+
+
+def as_text(draft: Draft, file: str, text: str) -> str:
+    """Return an account of a draft: each signal with its unit and frame, and what is left to do."""
+    wide = max(len(one.quantity) for one in draft.every)
+    lines = [
+        f"{file}: {counted(len(draft.every), 'signal')} of {counted(len(draft.actuators), 'actuator')} and the motion"
+    ]
+    for one in draft.every:
+        how = ", ".join(filter(None, [one.unit, one.frame, "sign -1" if one.sign < 0.0 else ""]))
+        lines.append(f"  {one.quantity:<{wide}}  {one.topic}: {', '.join(one.fields)}  [{how}]")
+        lines += [f"  {'':<{wide}}    check: {doubt}" for doubt in one.doubts]
+    count = open_lines(text)
+    todo = f"fill in {counted(count, 'line')} marked {MARK.removeprefix('# ').rstrip(':')}, then " if count else ""
+    lines.append(f"next    {todo}ferryid vessel check {file}, ferryid inspect {draft.log}, ferryid fit {draft.log}")
+    return "\n".join(lines)
+
+
+def questions(draft: Draft) -> list[Question]:
+    """Return what a person is asked of a draft; nothing of what a like profile has."""
+    asked: list[Question] = []
+    if draft.like is None:
+        asked += [
+            Question("length_m", "Length of the hull [m]", "5.0"),
+            Question("beam_m", "Beam [m]", "2.0"),
+            Question("mass_kg", "Mass with crew and load, as on the trial [kg]", "1500.0"),
+        ]
+    known = set() if draft.like is None else {one.name for one in draft.like.actuators}
+    for one in draft.actuators:
+        if any(UNKNOWN_ORDER in signal.doubts for signal in one.signals):
+            roles = ", ".join(signal.quantity.partition(".")[2] for signal in one.signals)
+            asked.append(
+                Question(f"{one.name}.order", f"{one.name}: is its {roles} an order or measured? (order, measured)", "")
+            )
+        if one.name in known:
+            continue
+        asked.append(Question(f"{one.name}.x_m", f"{one.name}: metres ahead of midship (negative astern)", "-2.0"))
+        asked.append(Question(f"{one.name}.y_m", f"{one.name}: metres to starboard (negative to port)", "0.0"))
+        if one.kind != "force":
+            asked.append(
+                Question(f"{one.name}.full", f"{one.name}: a speed [rpm] at which its thrust is known", "1000")
+            )
+            asked.append(Question(f"{one.name}.thrust", f"{one.name}: its thrust ahead at that speed [N]", "500"))
+    return asked
+
+
+def draft_text(draft: Draft, answers: Answers) -> str:
+    """Return a draft as TOML; what was not answered is a marked comment."""
+    like = draft.like
+    lines = [
+        'schema = "ferryid.vessel/1"',
+        f'name = "{answers.name}"',
+        f'source = "drafted from {_quoted(Path(draft.log).name)}'
+        + (f", hull and thrust as of {like.name}" if like is not None else "")
+        + '; numbers of the hull and the thrusters: state where they come from"',
+        "",
+        f"# Lines with {MARK.removeprefix('# ')} are what no log shows. Evidence stands above each signal; CHECK is what is",
+        "# assumed. Then: ferryid vessel check, ferryid inspect, ferryid fit.",
+        *(f"# Log: {note}." for note in draft.notes),
+        "",
+    ]
+    lines += _hull(answers) if like is None else _like_sections(draft, like.text)
+    known = {} if like is None else {one.name: one for one in like.actuators}
+    for one in draft.actuators:
+        if one.name not in known:
+            lines += _actuator(one, answers)
+    if like is not None:
+        lines += _unmapped(draft, like.actuators)
+    for signal in draft.every:
+        lines += _signal(_answered(signal, answers))
+    if draft.unused:
+        lines += ["", "# Topics of which nothing is mapped:", *(f"#   {name}" for name in draft.unused)]
+    return "\n".join(lines) + "\n"
+
+
+def _quoted(text: str) -> str:
+    return text.replace("\\", "/").replace('"', "'")
+
+
+def _number(answers: Answers, key: str) -> str | None:
+    text = answers.values.get(key, "").strip()
+    return f"{float(text):g}" if text else None
+
+
+def _entry(answers: Answers, key: str, name: str, hint: str, what: str) -> str:
+    value = _number(answers, key)
+    return f"{name} = {value}" if value is not None else f"{MARK} {name} = {hint}    {what}"
+
+
+def _hull(answers: Answers) -> list[str]:
+    length = _number(answers, "length_m")
+    turning = f"k_zz_m = {0.25 * float(length):g}" if length else f"{MARK} k_zz_m = 1.25"
+    return [
+        "[hull]",
+        _entry(answers, "length_m", "length_m", "5.0", "between perpendiculars, or over all"),
+        _entry(answers, "beam_m", "beam_m", "2.0", ""),
+        _entry(answers, "mass_kg", "mass_kg", "1500.0", "with crew and load, as on the trial"),
+        f"{turning}    # radius of gyration: a quarter of the length, usual for boats; not measured",
+        "",
+    ]
+
+
+def _actuator(one: DraftedActuator, answers: Answers) -> list[str]:
+    x, y = _number(answers, f"{one.name}.x_m"), _number(answers, f"{one.name}.y_m")
+    place = (
+        f"position_m = [{x}, {y}]"
+        if x and y
+        else f"{MARK} position_m = [-2.0, 0.0]    x ahead, y to starboard of midship"
+    )
+    lines = ["[[actuator]]", f'name = "{one.name}"', f'kind = "{one.kind}"', place]
+    if one.kind == "force":
+        return [*lines, ""]
+    if one.kind == "propeller_rudder":
+        lines.append(f"{MARK} diameter_m = 0.2    of the propeller")
+    full, thrust = _number(answers, f"{one.name}.full"), _number(answers, f"{one.name}.thrust")
+    lines += ["", "[actuator.thrust]", 'kind = "quadratic"    # a bollard pull as a table is better', 'input = "rpm"']
+    if full and thrust:
+        lines.append(
+            f"ahead = {float(thrust) / float(full) ** 2:.4g}    # {thrust} N at {full} rpm; astern the same, if not given"
+        )
+    else:
+        lines.append(f"{MARK} ahead = 5e-4    thrust [N] over the square of the speed [rpm]")
+    if one.kind == "propeller_rudder":
+        lines += [
+            "",
+            "[actuator.rudder]",
+            f"{MARK} area_m2 = 0.05",
+            f"{MARK} aspect_ratio = 1.5",
+            f"{MARK} x_m = -2.5    of the rudder, ahead of midship",
+        ]
+    return [*lines, ""]
+
+
+def _like_sections(draft: Draft, text: str) -> list[str]:
+    """Return the text of a profile without its head and its signals."""
+    kept: list[str] = []
+    within, begun = False, False
+    pending: list[str] = []
+    for line in text.splitlines():
+        header = re.match(r"\s*\[+\s*([A-Za-z_]+)", line)
+        if header:
+            begun, within = True, header[1] != "signals"
+            if within:
+                kept += pending
+            pending = []
+        if begun and (line.startswith("#") or not line.strip()):
+            # A comment belongs to what follows it.
+            pending.append(line)
+            continue
+        if begun and within:
+            kept += [*pending, line]
+            pending = []
+    return [*kept, ""]
+
+
+def _unmapped(draft: Draft, actuators: Sequence[Actuator]) -> list[str]:
+    """Return marks for actuators of the like profile of which the log shows nothing."""
+    here = {one.name for one in draft.actuators}
+    return [
+        f"{MARK} a signal of the actuator {one.name}, of which this log shows none"
+        for one in actuators
+        if one.name not in here
+    ]
+
+
+def _answered(signal: MappedSignal, answers: Answers) -> MappedSignal:
+    """Return a signal as an order, or as measured, where that was asked and answered."""
+    answer = answers.values.get(f"{signal.quantity.partition('.')[0]}.order", "").strip().lower()
+    if UNKNOWN_ORDER not in signal.doubts or not answer:
+        return signal
+    ordered = as_order(signal)
+    return ordered if answer.startswith("o") else replace(ordered, quantity=signal.quantity)
+
+
+def _signal(signal: MappedSignal) -> list[str]:
+    name = signal.quantity if re.fullmatch(r"[A-Za-z0-9_]+", signal.quantity) else f'"{signal.quantity}"'
+    lines = ["", *(f"# {one[:1].upper()}{one[1:]}." for one in signal.evidence)]
+    lines += [f"# CHECK: {one}." for one in signal.doubts]
+    lines += [f"[signals.{name}]", f"topic = {_text(signal.topic)}"]
+    if signal.quantity == "wind":
+        lines += [f"speed = {_text(signal.fields[0])}", f"direction = {_text(signal.fields[1])}"]
+    elif signal.unit == "quaternion":
+        lines.append(f"quaternion = [{', '.join(map(_text, signal.fields))}]")
+    elif len(signal.fields) == 1:
+        lines.append(f"field = {_text(signal.fields[0])}")
+    else:
+        lines.append(f"fields = [{', '.join(map(_text, signal.fields))}]")
+    if signal.unit != "quaternion":
+        lines.append(f"unit = {_text(signal.unit)}")
+    if signal.unit == "%":
+        lines.append(f"{MARK} full_rpm = 1000.0    speed at full power")
+    lines += [f"{key} = {_text(value)}" for key, value in signal.options]
+    if signal.frame:
+        lines.append(f"frame = {_text(signal.frame)}")
+    if signal.sign != 1.0:
+        lines.append(f"sign = {signal.sign:g}")
+    return lines
+
+
+def _text(value: str) -> str:
+    return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
