@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ferryid.cli.options import Json
+from ferryid.cli.options import From, Json, To, ranges
 from ferryid.cli.output import emit, progress, tell
 
 if TYPE_CHECKING:
@@ -38,16 +38,24 @@ def new(
         typer.Option(help="Where to write the profile, - for standard output; vessel.toml beside the log if left out."),
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a profile that is there.")] = False,
+    from_: From = None,
+    to: To = None,
     ask: Annotated[
         bool, typer.Option("--ask/--no-ask", help="Ask on a terminal for what no log shows; else its lines are marked.")
     ] = True,
     json: Json = None,
 ) -> None:
-    """Draft a profile from a log: which topics are what, in which unit and frame, with the evidence."""
+    """Draft a profile from a log, with the evidence for each signal.
+
+    Names show which topics may be pose, velocity, heading, rates, orders, feedback and wind; units, frames and signs are
+    those in which they move together. What no log shows is asked on a terminal, or left as lines marked FILL IN.
+    """
     from ferryid import api
 
     asking = _asked if ask and sys.stdin.isatty() and sys.stderr.isatty() else None
-    outcome = api.new_vessel(log, like, name=name, file=file, overwrite=overwrite, ask=asking, progress=progress)
+    outcome = api.new_vessel(
+        log, like, name=name, file=file, overwrite=overwrite, ask=asking, ranges=ranges(from_, to), progress=progress
+    )
     if str(file) == "-" and json != "-":
         typer.echo(outcome.json["toml"], nl=False)
         return
@@ -74,7 +82,10 @@ def check(
     ] = False,
     json: Json = None,
 ) -> None:
-    """Explain every fault of a profile with its line; warnings alone do not fail it."""
+    """Explain every fault of a profile, each with its line.
+
+    Warnings alone do not fail it.
+    """
     from ferryid import api
 
     outcome = api.check_vessel(file, identifiable=identifiable, progress=progress)
@@ -99,7 +110,10 @@ def show(
 
 @app.command("list")
 def list_(json: Json = None) -> None:
-    """List the profiles that have a name: bundled, and your own in the folder for configuration."""
+    """List the profiles that have a name.
+
+    These are the bundled ones and your own in the folder for configuration (~/.config/ferryid/vessels).
+    """
     from ferryid import api
 
     emit(api.vessels(), json)

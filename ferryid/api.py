@@ -655,6 +655,7 @@ def new_vessel(
     file: str | Path | None = None,
     overwrite: bool = False,
     ask: Callable[[Question], str] | None = None,
+    ranges: Ranges = (),
     progress: Progress = _quiet,
 ) -> Outcome:
     """Draft a vessel profile from a log and write it; see `ferryid.draft.new_profile`. The text is ``outcome.json["toml"]``.
@@ -678,7 +679,7 @@ def new_vessel(
 
     result, text, toml = new_profile(
         str(log), None if like is None else _profile(like), name=name, file=None if file is None else Path(file),
-        overwrite=overwrite, ask=ask, progress=progress,
+        overwrite=overwrite, ask=ask, ranges=tuple(ranges), progress=progress,
     )  # fmt: skip
     return _outcome({**result, "toml": toml}, text)
 

@@ -124,7 +124,7 @@ def actuator_fields(topics: Sequence[Topic]) -> list[ActuatorField]:
             words = _split(own)
             every = (*around, *words)
             marked = bool(set(every) & _MARKS) or (
-                topic.encoding == "table" and words == ("n",) and bool(bare & {"rudder"})
+                topic.encoding == "table" and words == ("n",) and "rudder" in bare and "e" not in bare
             )
             if not marked or set(words) & _UNRELATED:
                 continue

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ferryid.draft.actuator_fields import ActuatorField
-from ferryid.draft.kinematics import MappedSignal, Motion
+from ferryid.draft.mapped import MappedSignal, Motion
 from ferryid.draft.samples import Samples
 from ferryid.draft.thresholds import DRAFT
 from ferryid.types import Floats
@@ -142,6 +142,8 @@ def _response(cause: Floats, effect: Floats, step_s: float) -> float:
     best = 0.0
     for lag_s in _LAGS_S:
         rows = round(lag_s / step_s)
+        if rows >= cause.size:
+            break
         early, late = cause[: cause.size - rows], effect[rows:]
         known = np.isfinite(early + late)
         if np.count_nonzero(known) < DRAFT.fewest_rows or np.ptp(early[known]) == 0.0:

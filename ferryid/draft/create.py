@@ -11,6 +11,7 @@ from ferryid.draft.draft import draft_profile
 from ferryid.draft.write import Answers, Question, as_json, as_text, draft_text, questions
 from ferryid.errors import FerryIdError
 from ferryid.files import replacing
+from ferryid.types import TimeRanges
 from ferryid.vessel.folder_settings import VESSEL_FILE, log_folder
 from ferryid.vessel.profile import Profile
 
@@ -26,6 +27,7 @@ def new_profile(
     file: Path | None = None,
     overwrite: bool = False,
     ask: Ask | None = None,
+    ranges: TimeRanges = (),
     progress: Callable[[str], None],
 ) -> tuple[dict[str, Any], str, str]:
     """Draft a profile and write it.
@@ -44,6 +46,8 @@ def new_profile(
         Replace a file that is there.
     ask
         Asks a person for what no log shows; what is not asked is a marked line.
+    ranges
+        What of the log is compared; all of it where empty.
     progress
         Called with the name of each stage.
 
@@ -58,14 +62,14 @@ def new_profile(
         For a log of which no profile can be drafted, an answer that is none, and a file that is there.
     """
     folder = log_folder(log)
-    place = folder / VESSEL_FILE if file is None else file
+    place = _shown(folder / VESSEL_FILE) if file is None else file
     if str(place) != "-" and place.exists() and not overwrite:
         raise FerryIdError(f"{place}: is there already. Fix: give --file another name, or --overwrite")
     named = name or re.sub(r"[^A-Za-z0-9._-]+", "-", folder.name).strip("-._") or "vessel"
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", named):
         raise FerryIdError(f'--name: cannot be "{name}". Fix: use letters, digits, ".", "-" and "_" only')
     progress("reading the log")
-    draft = draft_profile(log, like)
+    draft = draft_profile(log, like, ranges)
     progress("")
     values = {}
     for question in questions(draft) if ask is not None else ():
@@ -80,3 +84,8 @@ def new_profile(
         with replacing(place, new=not overwrite) as temporary:
             temporary.write_text(text, encoding="utf-8")
     return as_json(draft, str(place), text), as_text(draft, str(place), text), text
+
+
+def _shown(path: Path) -> Path:
+    """Return a path as seen from the working folder, where it lies in it."""
+    return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path

@@ -9,12 +9,14 @@ from pathlib import Path
 from ferryid.draft.actuator_fields import actuator_fields
 from ferryid.draft.actuators import UNKNOWN_ORDER, DraftedActuator, drafted_actuators
 from ferryid.draft.fields import navigation_groups
-from ferryid.draft.kinematics import MappedSignal, navigation_signals
+from ferryid.draft.kinematics import navigation_signals
+from ferryid.draft.mapped import MappedSignal
 from ferryid.draft.samples import read_samples
 from ferryid.draft.wind import wind_fields, wind_signal
 from ferryid.errors import FerryIdError
 from ferryid.ingest import open_log
 from ferryid.ingest.log import Topic
+from ferryid.types import TimeRanges
 from ferryid.vessel.field_words import words_of
 from ferryid.vessel.profile import Profile
 
@@ -52,7 +54,7 @@ class Draft:
         return (*self.signals, *(signal for one in self.actuators for signal in one.signals))
 
 
-def draft_profile(log: str | Path, like: Profile | None = None) -> Draft:
+def draft_profile(log: str | Path, like: Profile | None = None, ranges: TimeRanges = ()) -> Draft:
     """Draft a profile from a log.
 
     Parameters
@@ -61,6 +63,8 @@ def draft_profile(log: str | Path, like: Profile | None = None) -> Draft:
         Path; parts of one recording joined by ``+``.
     like
         A profile that hull, thrust and the layout of tables are taken from; signals are looked for in any case.
+    ranges
+        What of the log is compared; all of it where empty.
 
     Raises
     ------
@@ -87,7 +91,7 @@ def draft_profile(log: str | Path, like: Profile | None = None) -> Draft:
         raise FerryIdError(
             f"{log}: {_nothing(topics)}. Fix: write the signal map by hand, see ferryid vessel show --toml"
         )
-    samples = read_samples(reader, wanted)
+    samples = read_samples(reader, wanted, str(log), ranges)
     signals, motion = navigation_signals(groups, samples)
     if not signals:
         raise FerryIdError(

@@ -207,7 +207,6 @@ def _of_topic(topic: Topic, around: set[str], fields: Mapping[str, tuple[str, ..
         for first, second in pairs:
             if {first, second} <= every.keys():
                 found.append((kind, (every[first], every[second]), ""))
-                break
     if {"latitude", "longitude"} <= every.keys() or {"lat", "lon"} <= every.keys():
         names = ("latitude", "longitude") if "latitude" in every else ("lat", "lon")
         found.append(("position", (every[names[0]], every[names[1]]), "geodetic"))

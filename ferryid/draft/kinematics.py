@@ -10,8 +10,10 @@ from math import log
 import numpy as np
 
 from ferryid.draft.fields import FieldGroup
+from ferryid.draft.mapped import MappedSignal, Motion, nearest_unit
 from ferryid.draft.samples import Samples, metres, yaw
 from ferryid.draft.thresholds import DRAFT
+from ferryid.errors import FerryIdError
 from ferryid.types import Flags, Floats
 from ferryid.vessel.field_words import unit_of_name, words_of
 from ferryid.vessel.frames import to_body
@@ -21,41 +23,6 @@ _BODY = ("FRD", "FLU")
 _WORLD = ("NED", "ENU")
 _SPEED_UNITS = ("m/s", "km/h", "kn", "ft/s")
 _RATE_UNITS = ("rad/s", "deg/s", "deg/min")
-
-
-@dataclass(frozen=True)
-class MappedSignal:
-    """One entry of a drafted signal map.
-
-    Attributes
-    ----------
-    quantity, topic, fields, unit, frame, sign
-        As of `ferryid.vessel.profile.Signal`.
-    evidence
-        What the log shows for unit, frame and sign, a sentence each.
-    doubts
-        What a person has to check, a sentence each.
-    """
-
-    quantity: str
-    topic: str
-    fields: tuple[str, ...]
-    unit: str
-    frame: str = ""
-    sign: float = 1.0
-    evidence: tuple[str, ...] = ()
-    doubts: tuple[str, ...] = ()
-    options: tuple[tuple[str, str], ...] = ()
-
-
-@dataclass(frozen=True)
-class Motion:
-    """How the vessel moves, on the grid: velocity ahead and to starboard [m/s], yaw rate [rad/s], heading [rad]; or NaN."""
-
-    u: Floats
-    v: Floats
-    r: Floats
-    psi: Floats
 
 
 @dataclass(frozen=True)
@@ -97,7 +64,7 @@ def navigation_signals(groups: Sequence[FieldGroup], samples: Samples) -> tuple[
     if chosen is None:
         return [], Motion(unknown, unknown, unknown, unknown)
     pose, velocity = chosen.pose, chosen.velocity
-    slope = samples.slope(pose.psi, pose.heading.topic)
+    slope = np.asarray(np.gradient(pose.psi, samples.grid_s))
     motion_u, motion_v = to_body(pose.north, pose.east, pose.psi)
     named = _named_frame(pose)
     found = []
@@ -105,7 +72,7 @@ def navigation_signals(groups: Sequence[FieldGroup], samples: Samples) -> tuple[
         found.append(_position(pose, chosen, named))
     found.append(_heading(pose, chosen, slope, named))
     if velocity is not None:
-        found.append(_velocity(velocity, chosen))
+        found.append(_velocity(velocity, chosen, _others(groups, chosen, samples)))
         if chosen.frame in _BODY:
             scale = KINDS["speed"][found[-1].unit]
             first, second = (_smoothed(samples, velocity, place) * scale for place in (0, 1))
@@ -294,12 +261,6 @@ def _along(pose: _Pose) -> float:
     return float(np.mean(np.cos(course - pose.psi[rows])))
 
 
-def nearest_unit(gain: float, kind: str, units: Sequence[str]) -> tuple[str, float]:
-    """Return the unit whose factor explains a gain of recorded over SI best, and the gain in that unit."""
-    unit = min(units, key=lambda one: abs(log(max(gain, 1e-12) * KINDS[kind][one])))
-    return unit, gain * KINDS[kind][unit]
-
-
 def _position(pose: _Pose, chosen: _Agreement, named: str) -> MappedSignal:
     position = pose.position
     assert position is not None
@@ -348,13 +309,48 @@ def _heading(pose: _Pose, chosen: _Agreement, slope: Floats, named: str) -> Mapp
     )  # fmt: skip
 
 
-def _velocity(velocity: FieldGroup, chosen: _Agreement) -> MappedSignal:
+def _others(groups: Sequence[FieldGroup], chosen: _Agreement, samples: Samples) -> tuple[str, ...]:
+    """Return the other velocities of a log, with the share of each that the position's slope explains, in whatever frame.
+
+    Raises
+    ------
+    FerryIdError
+        Where several disagree with each other and no position decides.
+    """
+    others = [one for one in _of_kind(groups, "velocity") if one != chosen.velocity]
+    if chosen.velocity is None or not others:
+        return ()
+    if chosen.pose.position is None or chosen.share < DRAFT.agrees:
+        mine = [_smoothed(samples, chosen.velocity, place) for place in (0, 1)]
+        apart = [one for one in others if not _alike(mine, [_smoothed(samples, one, place) for place in (0, 1)])]
+        if apart:
+            names = ", ".join(one.label for one in (chosen.velocity, *apart))
+            what = "no position" if chosen.pose.position is None else "the position agrees with none, so that it"
+            raise FerryIdError(
+                f"{1 + len(apart)} velocities disagree, and {what} decides which is right: {names}. Fix: choose a part of the "
+                "log with --from and --to in which the vessel moves, or write the signal map by hand, see ferryid vessel show"
+            )
+        return ()
+    shares = [(max(_agreement(chosen.pose, one, samples).share, 0.0), one.label) for one in others]
+    return tuple(f"{label} {100.0 * share:.0f} %" for share, label in sorted(shares, reverse=True))
+
+
+def _alike(a: Sequence[Floats], b: Sequence[Floats]) -> bool:
+    """Tell whether two velocities are the same but for their unit and frame."""
+    x, y = b
+    turned = ((x, y), (x, -y), (y, x), (-x, -y))
+    return any(_explained(a[0], a[1], one, other)[0] >= DRAFT.agrees for one, other in turned)
+
+
+def _velocity(velocity: FieldGroup, chosen: _Agreement, others: Sequence[str]) -> MappedSignal:
     stated = unit_of_name(velocity.fields[0], "speed")
     unit, left = (
         (stated, chosen.gain * KINDS["speed"][stated]) if stated else nearest_unit(chosen.gain, "speed", _SPEED_UNITS)
     )
     evidence = f"the position's slope explains {100 * chosen.share:.0f} % of it, with {left:.2f} of its size in {unit}"
     doubts = []
+    if others:
+        evidence += f"; of other velocities: {', '.join(others)}"
     if chosen.pose.position is not None and chosen.share < DRAFT.agrees:
         doubts.append(
             "pose and velocity do not agree in any frame: another topic may be right, or the log is too short"
@@ -400,4 +396,7 @@ def _yaw_rate(
     stated = unit_of_name(group.fields[0], "rate")
     unit, left = (stated, abs(gain) * KINDS["rate"][stated]) if stated else nearest_unit(abs(gain), "rate", _RATE_UNITS)
     evidence = f"follows the slope of the heading (correlation {seen:.2f}) with {left:.2f} of its size in {unit}"
-    return MappedSignal("yaw_rate", group.topic, group.fields, unit, "FRD" if gain > 0.0 else "FLU", 1.0, (evidence,))
+    far = abs(log(max(left, 1e-3))) > DRAFT.gain
+    doubts = (f"it is {left:.2f} times the slope of the heading, which no unit explains",) if far else ()
+    frame = "FRD" if gain > 0.0 else "FLU"
+    return MappedSignal("yaw_rate", group.topic, group.fields, unit, frame, 1.0, (evidence,), doubts)

@@ -10,7 +10,8 @@ import numpy as np
 from ferryid.errors import FerryIdError
 from ferryid.ingest.clocks import repair_all
 from ferryid.ingest.log import Reader, Series
-from ferryid.types import Floats
+from ferryid.signals.time_ranges import spans_of
+from ferryid.types import Flags, Floats, TimeRanges
 from ferryid.vessel.frames import local_north_east, yaw_of_quaternion
 
 GRID_HZ = 5.0
@@ -33,12 +34,15 @@ class Samples:
         Times of the grid [s], shape (n,).
     start_ns
         Time of the first row [ns].
+    used
+        True on the rows of the grid that count, shape (n,); None for all.
     """
 
     times_s: Mapping[str, Floats]
     columns: Mapping[tuple[str, str], Floats]
     grid_s: Floats
     start_ns: int
+    used: Flags | None = None
 
     def has(self, topic: str, fields: Sequence[str]) -> bool:
         """Tell whether fields are there, and one of them changes (a quaternion of yaw has two that do not)."""
@@ -68,6 +72,8 @@ class Samples:
             out[wide] = np.nan
         outside = (self.grid_s < times[0]) | (self.grid_s > times[-1])
         out[outside] = np.nan
+        if self.used is not None:
+            out[~self.used] = np.nan
         return out
 
     def smooth(self, values: Floats, topic: str) -> Floats:
@@ -83,13 +89,13 @@ class Samples:
         return np.asarray(np.gradient(self.smooth(values, topic), self.grid_s))
 
 
-def read_samples(reader: Reader, wanted: Mapping[str, Sequence[str]]) -> Samples:
-    """Read fields of a log and put their times on one clock.
+def read_samples(reader: Reader, wanted: Mapping[str, Sequence[str]], log: str, ranges: TimeRanges = ()) -> Samples:
+    """Read fields of a log and put their times on one clock; with `ranges` what lies in them is used alone.
 
     Raises
     ------
     FerryIdError
-        Where none of them holds two rows.
+        Where none of them holds two rows, and for a range outside the log.
     """
     series: dict[str, Series] = {}
     for topic, fields in wanted.items():
@@ -101,8 +107,11 @@ def read_samples(reader: Reader, wanted: Mapping[str, Sequence[str]]) -> Samples
     repaired = repair_all(series)
     times = {topic: time_ns for topic, (time_ns, rows, _) in repaired.items() if len(rows) > 1}
     if not times:
-        raise FerryIdError("the log holds no field that could be a pose, a velocity or an actuator")
-    start = min(int(one[0]) for one in times.values())
+        raise FerryIdError(
+            f"{log}: no topic that could be a pose, a velocity or an actuator holds two rows. Fix: use a longer log of the vessel"
+        )
+    start, end_ns = min(int(one[0]) for one in times.values()), max(int(one[-1]) for one in times.values())
+    spans = spans_of(log, start, end_ns, ranges)
     columns = {}
     for topic in times:
         rows = repaired[topic][1]
@@ -112,7 +121,11 @@ def read_samples(reader: Reader, wanted: Mapping[str, Sequence[str]]) -> Samples
     times_s = {topic: np.asarray((one - start) * 1e-9, dtype=np.float64) for topic, one in times.items()}
     end = max(float(one[-1]) for one in times_s.values())
     count = int(min(max(end * GRID_HZ, 2.0), MOST_ROWS))
-    return Samples(times_s, columns, np.linspace(0.0, end, count), start)
+    grid = np.linspace(0.0, end, count)
+    if spans:
+        inside = [(grid >= (a - start) * 1e-9) & (grid <= (b - start) * 1e-9) for a, b in spans]
+        return Samples(times_s, columns, grid, start, np.logical_or.reduce(inside))
+    return Samples(times_s, columns, grid, start)
 
 
 def metres(samples: Samples, topic: str, fields: Sequence[str]) -> tuple[Floats, Floats]:

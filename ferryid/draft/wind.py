@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ferryid.draft.fields import ORDERS, numeric_fields
-from ferryid.draft.kinematics import MappedSignal, Motion
+from ferryid.draft.mapped import MappedSignal, Motion
 from ferryid.draft.samples import Samples
 from ferryid.draft.thresholds import DRAFT
 from ferryid.ingest.log import Topic

@@ -12,7 +12,7 @@ from typing import Any
 from ferryid.counts import counted
 from ferryid.draft.actuators import UNKNOWN_ORDER, DraftedActuator
 from ferryid.draft.draft import Draft, as_order
-from ferryid.draft.kinematics import MappedSignal
+from ferryid.draft.mapped import MappedSignal
 from ferryid.vessel.profile import Actuator
 
 MARK = "# FILL IN:"
@@ -83,9 +83,7 @@ def as_json(draft: Draft, file: str, text: str) -> dict[str, Any]:
 def as_text(draft: Draft, file: str, text: str) -> str:
     """Return an account of a draft: each signal with its unit and frame, and what is left to do."""
     wide = max(len(one.quantity) for one in draft.every)
-    lines = [
-        f"{file}: {counted(len(draft.every), 'signal')} of {counted(len(draft.actuators), 'actuator')} and the motion"
-    ]
+    lines = [f"{file}: {counted(len(draft.every), 'signal')}, {counted(len(draft.actuators), 'actuator')}"]
     for one in draft.every:
         how = ", ".join(filter(None, [one.unit, one.frame, "sign -1" if one.sign < 0.0 else ""]))
         lines.append(f"  {one.quantity:<{wide}}  {one.topic}: {', '.join(one.fields)}  [{how}]")
@@ -134,8 +132,8 @@ def draft_text(draft: Draft, answers: Answers) -> str:
         + (f", hull and thrust as of {like.name}" if like is not None else "")
         + '; numbers of the hull and the thrusters: state where they come from"',
         "",
-        f"# Lines with {MARK.removeprefix('# ')} are what no log shows. Evidence stands above each signal; CHECK is what is",
-        "# assumed. Then: ferryid vessel check, ferryid inspect, ferryid fit.",
+        f"# Lines marked {MARK.removeprefix('# ')} are what no log shows: remove the mark and correct the number. Evidence",
+        "# stands above each signal, CHECK is what is assumed. Then: ferryid vessel check, ferryid inspect, ferryid fit.",
         *(f"# Log: {note}." for note in draft.notes),
         "",
     ]
@@ -164,7 +162,8 @@ def _number(answers: Answers, key: str) -> str | None:
 
 def _entry(answers: Answers, key: str, name: str, hint: str, what: str) -> str:
     value = _number(answers, key)
-    return f"{name} = {value}" if value is not None else f"{MARK} {name} = {hint}    {what}"
+    note = f"    # {what}" if what else ""
+    return f"{name} = {value}" if value is not None else f"{MARK} {name} = {hint}{note}"
 
 
 def _hull(answers: Answers) -> list[str]:
@@ -185,13 +184,13 @@ def _actuator(one: DraftedActuator, answers: Answers) -> list[str]:
     place = (
         f"position_m = [{x}, {y}]"
         if x and y
-        else f"{MARK} position_m = [-2.0, 0.0]    x ahead, y to starboard of midship"
+        else f"{MARK} position_m = [-2.0, 0.0]    # x ahead, y to starboard of midship"
     )
     lines = ["[[actuator]]", f'name = "{one.name}"', f'kind = "{one.kind}"', place]
     if one.kind == "force":
         return [*lines, ""]
     if one.kind == "propeller_rudder":
-        lines.append(f"{MARK} diameter_m = 0.2    of the propeller")
+        lines.append(f"{MARK} diameter_m = 0.2    # of the propeller")
     full, thrust = _number(answers, f"{one.name}.full"), _number(answers, f"{one.name}.thrust")
     lines += ["", "[actuator.thrust]", 'kind = "quadratic"    # a bollard pull as a table is better', 'input = "rpm"']
     if full and thrust:
@@ -199,14 +198,14 @@ def _actuator(one: DraftedActuator, answers: Answers) -> list[str]:
             f"ahead = {float(thrust) / float(full) ** 2:.4g}    # {thrust} N at {full} rpm; astern the same, if not given"
         )
     else:
-        lines.append(f"{MARK} ahead = 5e-4    thrust [N] over the square of the speed [rpm]")
+        lines.append(f"{MARK} ahead = 5e-4    # thrust [N] over the square of the speed [rpm]")
     if one.kind == "propeller_rudder":
         lines += [
             "",
             "[actuator.rudder]",
             f"{MARK} area_m2 = 0.05",
             f"{MARK} aspect_ratio = 1.5",
-            f"{MARK} x_m = -2.5    of the rudder, ahead of midship",
+            f"{MARK} x_m = -2.5    # of the rudder, ahead of midship",
         ]
     return [*lines, ""]
 
@@ -268,7 +267,7 @@ def _signal(signal: MappedSignal) -> list[str]:
     if signal.unit != "quaternion":
         lines.append(f"unit = {_text(signal.unit)}")
     if signal.unit == "%":
-        lines.append(f"{MARK} full_rpm = 1000.0    speed at full power")
+        lines.append(f"{MARK} full_rpm = 1000.0    # speed at full power")
     lines += [f"{key} = {_text(value)}" for key, value in signal.options]
     if signal.frame:
         lines.append(f"frame = {_text(signal.frame)}")

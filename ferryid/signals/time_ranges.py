@@ -108,7 +108,7 @@ def cut(recording: Recording, profile: Profile, ranges: TimeRanges) -> Recording
     """
     if not ranges:
         return recording
-    spans = _spans(recording, ranges)
+    spans = spans_of(recording.name, recording.start_ns, recording.end_ns, ranges)
     streams: dict[str, Stream] = {}
     missing, found = dict(recording.missing), dict(recording.found)
     shown = _shown(spans, recording.start_ns)
@@ -138,21 +138,26 @@ def cut(recording: Recording, profile: Profile, ranges: TimeRanges) -> Recording
     )
 
 
-def _spans(recording: Recording, ranges: TimeRanges) -> Spans:
-    """Return the ranges as times, those that overlap as one."""
-    start, end = recording.start_ns, recording.end_ns
+def spans_of(log: str, start: int, end: int, ranges: TimeRanges) -> Spans:
+    """Return the ranges of a log between two times [ns] as times, those that overlap as one.
+
+    Raises
+    ------
+    FerryIdError
+        As `cut`.
+    """
     found = []
     for asked in ranges:
-        first = _placed(recording, asked[0], start, start)
-        last = _placed(recording, asked[1], end, max(first, start))
+        first = _placed(log, (start, end), asked[0], start, start)
+        last = _placed(log, (start, end), asked[1], end, max(first, start))
         if last < start or first > end:
             raise FerryIdError(
-                f"{recording.name}: the range {_words(asked)} is outside the log, which is {(end - start) * 1e-9:.1f} s long"
+                f"{log}: the range {_words(asked)} is outside the log, which is {(end - start) * 1e-9:.1f} s long"
                 f"{_clock(start, end)}. Fix: correct --from and --to"
             )
         if first >= last:
             raise FerryIdError(
-                f"{recording.name}: the range {_words(asked)} ends before it begins, found {_relative(first, start)} to "
+                f"{log}: the range {_words(asked)} ends before it begins, found {_relative(first, start)} to "
                 f"{_relative(last, start)} of the log. Fix: correct --from and --to"
             )
         found.append((max(first, start), min(last, end)))
@@ -165,9 +170,9 @@ def _spans(recording: Recording, ranges: TimeRanges) -> Spans:
     return tuple(merged)
 
 
-def _placed(recording: Recording, time: str | float | None, default: int, after: int) -> int:
+def _placed(log: str, whole: tuple[int, int], time: str | float | None, default: int, after: int) -> int:
     """Return a time of a range [ns]; a time of day is the first one at or after `after`."""
-    start, end = recording.start_ns, recording.end_ns
+    start, end = whole
     text = "" if time is None else str(time)
     if not text:
         return default
@@ -177,7 +182,7 @@ def _placed(recording: Recording, time: str | float | None, default: int, after:
     date, clock = _date(text), _CLOCK.fullmatch(text)
     if start < SIGNALS.epoch_ns and (date or clock):
         raise FerryIdError(
-            f"{recording.name}: its times are counted from its start, so that {text} is at no place in it. "
+            f"{log}: its times are counted from its start, so that {text} is at no place in it. "
             "Fix: give --from and --to in seconds"
         )
     if clock is not None:

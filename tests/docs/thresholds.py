@@ -13,6 +13,7 @@ from tests.docs.pages import ROOT
 PAGE = ROOT / "docs" / "thresholds.md"
 ORDER = (
     "signals",
+    "draft",
     "effects",
     "regression",
     "models",

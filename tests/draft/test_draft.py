@@ -1,0 +1,297 @@
+"""Profiles drafted from logs: what is mapped, in which unit, frame and sign, and what is left to a person."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ferryid import api
+from ferryid.draft import Answers, Draft, Question, draft_profile, draft_text, questions
+from ferryid.draft.mapped import MappedSignal
+from ferryid.errors import FerryIdError
+from ferryid.vessel import check_profile, load_profile, parse_profile
+from ferryid.vessel.profile import Profile
+
+FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
+Columns = dict[str, np.ndarray]
+
+
+def sailed(seconds: float = 240.0) -> Columns:
+    """Return a trial in NED, FRD and SI: a boat whose two thrusters and rudder turn it, at 10 Hz."""
+    t = np.arange(0.0, seconds, 0.1)
+    rudder = 0.4 * np.sign(np.sin(2.0 * np.pi * t / 31.0)) + 0.2 * np.sin(2.0 * np.pi * t / 47.0)
+    speed = 700.0 + 200.0 * np.sin(2.0 * np.pi * t / 60.0)
+    u, v, r, psi, north, east = (np.zeros_like(t) for _ in range(6))
+    for k in range(len(t) - 1):
+        u[k + 1] = u[k] + 0.1 * (0.002 * speed[k] - 0.7 * u[k]) * 0.3
+        r[k + 1] = r[k] + 0.1 * (0.8 * rudder[k] * u[k] - 2.0 * r[k])
+        v[k + 1] = v[k] + 0.1 * (-0.5 * u[k] * r[k] - 0.8 * v[k])
+        psi[k + 1] = psi[k] + 0.1 * r[k]
+        north[k + 1] = north[k] + 0.1 * (u[k] * np.cos(psi[k]) - v[k] * np.sin(psi[k]))
+        east[k + 1] = east[k] + 0.1 * (u[k] * np.sin(psi[k]) + v[k] * np.cos(psi[k]))
+    return {"t": t, "rudder": rudder, "n": speed, "u": u, "v": v, "r": r, "psi": psi, "N": north, "E": east}
+
+
+def table(folder: Path, columns: Columns) -> Path:
+    """Write columns as a table."""
+    path = folder / "trial.csv"
+    rows = zip(*columns.values(), strict=True)
+    text = "\n".join([",".join(columns), *(",".join(f"{value:.9g}" for value in row) for row in rows)])
+    path.write_text(text + "\n", encoding="utf-8")
+    return path
+
+
+def drafted(folder: Path, columns: Columns) -> tuple[Draft, dict[str, MappedSignal]]:
+    """Return the draft of a table, and its signals by their quantity."""
+    draft = draft_profile(table(folder, columns))
+    return draft, {signal.quantity: signal for signal in draft.every}
+
+
+def wrapped_deg(angle: np.ndarray) -> np.ndarray:
+    return np.degrees(angle) % 360.0
+
+
+def in_ned(c: Columns) -> Columns:
+    return {"t": c["t"], "N": c["N"], "E": c["E"], "psi": c["psi"], "u": c["u"], "v": c["v"], "r": c["r"],
+            "rudder": c["rudder"], "rpm": c["n"]}  # fmt: skip
+
+
+def in_degrees_and_knots(c: Columns) -> Columns:
+    knots = 3600.0 / 1852.0
+    return {"t": c["t"], "N": c["N"], "E": c["E"], "heading": wrapped_deg(c["psi"]), "u": c["u"] * knots, "v": c["v"] * knots,
+            "r": np.degrees(c["r"]), "rudder": -np.degrees(c["rudder"]), "rpm": c["n"]}  # fmt: skip
+
+
+def in_latitude_and_enu(c: Columns) -> Columns:
+    over_n = c["u"] * np.cos(c["psi"]) - c["v"] * np.sin(c["psi"])
+    over_e = c["u"] * np.sin(c["psi"]) + c["v"] * np.cos(c["psi"])
+    longitude = 10.4 + c["E"] / (111_400.0 * np.cos(np.radians(63.4)))
+    return {"t": c["t"], "latitude": 63.4 + c["N"] / 111_400.0, "longitude": longitude, "yaw": 0.5 * np.pi - c["psi"],
+            "vx": over_e, "vy": over_n, "yaw_rate": -c["r"], "rudder": c["rudder"], "rpm": c["n"] / 60.0}  # fmt: skip
+
+
+def in_flu(c: Columns) -> Columns:
+    return {"t": c["t"], "N": c["N"], "E": c["E"], "psi": c["psi"], "u": c["u"], "v": -c["v"], "r": -c["r"],
+            "rudder": c["rudder"], "rpm": c["n"]}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("recorded", "expected"),
+    [
+        (
+            in_ned,
+            {
+                "position": ("m", "NED"),
+                "heading": ("rad", "NED"),
+                "velocity": ("m/s", "FRD"),
+                "yaw_rate": ("rad/s", "FRD"),
+            },
+        ),
+        (
+            in_degrees_and_knots,
+            {
+                "position": ("m", "NED"),
+                "heading": ("deg", "NED"),
+                "velocity": ("kn", "FRD"),
+                "yaw_rate": ("deg/s", "FRD"),
+            },
+        ),
+        (
+            in_latitude_and_enu,
+            {
+                "position": ("deg", "geodetic"),
+                "heading": ("rad", "ENU"),
+                "velocity": ("m/s", "ENU"),
+                "yaw_rate": ("rad/s", "FLU"),
+            },
+        ),
+        (
+            in_flu,
+            {
+                "position": ("m", "NED"),
+                "heading": ("rad", "NED"),
+                "velocity": ("m/s", "FLU"),
+                "yaw_rate": ("rad/s", "FLU"),
+            },
+        ),
+    ],
+)
+def test_units_and_frames_show_in_the_motion(
+    tmp_path: Path, recorded: Callable[[Columns], Columns], expected: dict[str, tuple[str, str]]
+) -> None:
+    _, found = drafted(tmp_path, recorded(sailed()))
+    assert {name: (found[name].unit, found[name].frame) for name in expected} == expected
+    assert all(found[name].evidence for name in expected)
+
+
+def test_a_rudder_that_is_positive_to_port_has_its_sign_reversed(tmp_path: Path) -> None:
+    _, found = drafted(tmp_path, in_degrees_and_knots(sailed()))
+    assert (found["propeller.rudder"].sign, found["propeller.rudder"].unit) == (-1.0, "deg")
+    assert any("positive turns to port" in one for one in found["propeller.rudder"].evidence)
+    _, found = drafted(tmp_path, in_ned(sailed()))
+    assert (found["propeller.rudder"].sign, found["propeller.rudder"].unit) == (1.0, "rad")
+    assert (found["propeller.speed"].unit, found["propeller.speed"].fields) == ("rpm", ("rpm",))
+
+
+def test_what_motion_does_not_show_is_to_be_checked(tmp_path: Path) -> None:
+    columns = in_ned(sailed())
+    named = {"N": "x", "E": "y"}
+    _, found = drafted(tmp_path, {named.get(name, name): values for name, values in columns.items()})
+    assert found["position"].frame == "NED"
+    assert any("mirror image" in one for one in found["heading"].doubts)
+    _, found = drafted(tmp_path, columns)
+    assert not found["heading"].doubts
+    assert any("order" in one for one in found["propeller.speed"].doubts)
+
+
+def test_a_velocity_that_no_unit_explains_is_to_be_checked(tmp_path: Path) -> None:
+    columns = in_ned(sailed())
+    columns |= {"u": 1.4 * columns["u"], "v": 1.4 * columns["v"]}
+    _, found = drafted(tmp_path, columns)
+    assert any(re.search(r"1\.4\d? times the position's slope", one) for one in found["velocity"].doubts)
+
+
+def test_the_velocity_that_agrees_is_taken_and_the_others_are_named(tmp_path: Path) -> None:
+    c = sailed()
+    noise = np.random.default_rng(1).normal(size=(4, len(c["t"])))
+    columns = in_ned(c) | {"velx": noise[0], "vely": noise[1]}
+    _, found = drafted(tmp_path, columns)
+    assert found["velocity"].fields == ("u", "v")
+    assert "of other velocities: table: velx, vely 0 %" in found["velocity"].evidence[0]
+
+
+@pytest.mark.parametrize(
+    ("columns", "told"),
+    [
+        (
+            ("t", "N", "E", "u", "v", "rudder", "n"),
+            "no field looks like a heading that changes.* Fix: record the heading",
+        ),
+        (("t", "N", "E", "psi", "u", "v", "r"), "no field looks like an actuator.* Fix: record the orders"),
+        (("t", "level", "flag"), "no topic has a name of pose, velocity, heading or actuator"),
+    ],
+)
+def test_a_log_that_lacks_what_is_needed(tmp_path: Path, columns: tuple[str, ...], told: str) -> None:
+    c = sailed(60.0)
+    c |= {"level": c["n"], "flag": c["u"]}
+    with pytest.raises(FerryIdError, match=told):
+        draft_profile(table(tmp_path, {name: c[name] for name in columns}))
+
+
+def test_velocities_that_disagree_without_a_position(tmp_path: Path) -> None:
+    c = sailed(60.0)
+    noise = np.random.default_rng(1).normal(size=(4, len(c["t"])))
+    columns = {"t": c["t"], "psi": c["psi"], "u": c["u"], "v": c["v"], "vx": noise[0], "vy": noise[1], "vn": noise[2],
+               "ve": noise[3], "rpm": c["n"]}  # fmt: skip
+    with pytest.raises(FerryIdError, match=r"velocities disagree, and no position decides.* Fix: choose a part"):
+        draft_profile(table(tmp_path, columns))
+
+
+def test_columns_without_names(tmp_path: Path) -> None:
+    path = tmp_path / "bare.dat"
+    path.write_text("".join(f"{0.1 * k:.1f} {k} {k * 2}\n" for k in range(100)), encoding="utf-8")
+    with pytest.raises(FerryIdError, match=r"its columns have no names.* Fix: add a header row"):
+        draft_profile(path)
+
+
+def test_a_part_of_a_log(tmp_path: Path) -> None:
+    columns = in_ned(sailed())
+    late = columns["t"] > 120.0
+    # In its second half, the velocity is that of another boat.
+    columns |= {"u": np.where(late, -columns["u"], columns["u"])}
+    path = table(tmp_path, columns)
+    halves = [
+        next(one for one in draft_profile(path, ranges=(part,)).every if one.quantity == "velocity")
+        for part in ((0, 110), (130, 240))
+    ]
+    assert "explains 100 %" in halves[0].evidence[0]
+    assert halves[1].doubts
+
+
+def test_marked_lines_are_all_that_a_draft_lacks(tmp_path: Path) -> None:
+    draft = draft_profile(FIXTURES / "short.mcap")
+    text = draft_text(draft, Answers("boat"))
+    path = tmp_path / "boat.toml"
+    path.write_text(text, encoding="utf-8")
+    faults = [fault.message for fault in check_profile(path)]
+    assert faults
+    assert all("lacks" in one for one in faults)
+    path.write_text(text.replace("# FILL IN: ", ""), encoding="utf-8")
+    assert [fault for fault in check_profile(path) if not fault.warning] == []
+
+
+def test_answers_complete_a_draft(tmp_path: Path) -> None:
+    draft = draft_profile(FIXTURES / "short.mcap")
+    asked = questions(draft)
+    assert [one.key for one in asked][:5] == ["length_m", "beam_m", "mass_kg", "thruster1.x_m", "thruster1.y_m"]
+    values = {
+        one.key: {"length_m": "5", "beam_m": "2.8", "mass_kg": "1670", "thruster2.x_m": "-1.8"}.get(one.key, "1.8")
+        for one in asked
+    }
+    profile = parse_profile(draft_text(draft, Answers("boat", values)), "boat.toml")
+    assert profile.hull.mass_kg == 1670.0
+    assert profile.actuators[1].position_m == (-1.8, 1.8)
+    assert not Question("length_m", "", "").accepts("five")
+    assert Question("a.order", "", "").accepts("order")
+
+
+def test_an_answer_makes_an_order_of_a_signal(tmp_path: Path) -> None:
+    draft, _ = drafted(tmp_path, {**in_ned(sailed()), "delta_rudder [rad]": sailed()["rudder"]})
+    text = draft_text(draft, Answers("boat", {"propeller.order": "order"}))
+    assert '[signals."propeller.speed.command"]' in text
+
+
+def test_like_another_profile_a_draft_is_whole(tmp_path: Path) -> None:
+    known = load_profile("milliampere")
+    draft = draft_profile(FIXTURES / "short.mcap", known)
+    profile = parse_profile(draft_text(draft, Answers("twin")), "twin.toml")
+    assert profile.actuators == known.actuators
+    assert np.array_equal(profile.hull.M, known.hull.M)
+    assert profile.wind == known.wind
+    assert mapped(profile.signals) <= mapped(known.signals)
+
+
+def mapped(signals: tuple) -> set[tuple]:
+    return {(s.quantity, s.topic, s.fields, s.unit, s.frame, s.sign, tuple(sorted(s.options.items()))) for s in signals}
+
+
+def test_a_file_that_is_there_is_kept(tmp_path: Path) -> None:
+    place = tmp_path / "vessel.toml"
+    place.write_text("mine", encoding="utf-8")
+    with pytest.raises(FerryIdError, match=r"vessel\.toml: is there already\. Fix: give --file"):
+        api.new_vessel(FIXTURES / "short.mcap", file=place)
+    assert place.read_text(encoding="utf-8") == "mine"
+    result = api.new_vessel(FIXTURES / "short.mcap", "milliampere", file=place, overwrite=True)
+    assert result.json["fill_in"] == 0
+    assert load_profile(place).name == "fixtures"
+
+
+RECORDINGS = {
+    "esso-osaka": "esso_osaka/*/*.csv",
+    "gunnerus": "gunnerus/*.csv",
+    "kvlcc2-model": "kvlcc2/HSVA*.dat",
+    "milliampere-2025": "milliampere1",
+    "vtec-usv": "vtec_usv/*.bag",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", RECORDINGS)
+def test_a_draft_maps_what_the_bundled_profile_maps(shared_data: Callable[[str], Path], name: str) -> None:
+    """Topic, fields, unit, frame and sign; names of actuators, layouts and what are orders are the profile's."""
+    folder, _, pattern = RECORDINGS[name].partition("/")
+    root, known = shared_data(folder), load_profile(name)
+    logs = sorted(root.glob(pattern)) if pattern else [root]
+    assert logs
+    for log in logs:
+        draft = draft_profile(log, known)
+        profile: Profile = parse_profile(draft_text(draft, Answers("drafted")), "drafted.toml")
+        assert _bare(known) <= _bare(profile), log
+
+
+def _bare(profile: Profile) -> set[tuple]:
+    return {(quantity, topic.strip("/"), *rest) for quantity, topic, *rest in mapped(profile.signals)}
