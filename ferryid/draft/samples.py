@@ -108,7 +108,7 @@ def read_samples(reader: Reader, wanted: Mapping[str, Sequence[str]], log: str, 
     times = {topic: time_ns for topic, (time_ns, rows, _) in repaired.items() if len(rows) > 1}
     if not times:
         raise FerryIdError(
-            f"{log}: no topic that could be a pose, a velocity or an actuator holds two rows. Fix: use a longer log of the vessel"
+            f"{log}: no topic that could be a pose, a velocity or an actuator holds two rows. Fix: use a longer log"
         )
     start, end_ns = min(int(one[0]) for one in times.values()), max(int(one[-1]) for one in times.values())
     spans = spans_of(log, start, end_ns, ranges)

@@ -1,0 +1,90 @@
+"""``ferryid vessel new``: from a log to a profile that a fit takes."""
+
+from __future__ import annotations
+
+import io
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.cli.test_every_command import conforms
+
+
+@pytest.fixture
+def log(tmp_path: Path, fixtures: Path) -> Path:
+    """Give a log in a folder of its own."""
+    (tmp_path / "day").mkdir()
+    return Path(shutil.copy(fixtures / "short.mcap", tmp_path / "day" / "a.mcap"))
+
+
+class _Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_a_draft_beside_the_log_is_what_the_next_command_uses(ferryid, log: Path, tmp_path: Path) -> None:
+    run = ferryid("vessel", "new", log, "--like", "milliampere", "--json", "-")
+    assert run.code == 0, run.err
+    draft = conforms(run.out)
+    assert draft["fill_in"] == 0
+    assert {one["quantity"] for one in draft["signals"]} >= {
+        "position",
+        "heading",
+        "velocity",
+        "yaw_rate",
+        "thruster1.speed",
+    }
+    run = ferryid("ingest", log, "--out", tmp_path / "out")
+    assert run.code == 0, run.err
+    assert run.err == f"vessel day: from {log.parent / 'vessel.toml'}\n"
+    run = ferryid("vessel", "new", log)
+    assert run.code == 2
+    assert "vessel.toml: is there already. Fix:" in run.err
+
+
+def test_without_a_person_lines_are_marked(ferryid, log: Path) -> None:
+    run = ferryid("vessel", "new", log, "--name", "boat")
+    assert run.code == 0
+    assert "lines marked FILL IN, then ferryid vessel check" in run.out
+    assert "# FILL IN: mass_kg" in (log.parent / "vessel.toml").read_text(encoding="utf-8")
+    run = ferryid("fit", log)
+    assert run.code == 2
+    assert "vessel.toml:" in run.err
+
+
+def test_a_draft_to_standard_output_is_toml_alone(ferryid, log: Path) -> None:
+    run = ferryid("vessel", "new", log, "--file", "-")
+    assert run.out.startswith('schema = "ferryid.vessel/1"\n')
+    assert not (log.parent / "vessel.toml").exists()
+
+
+def test_a_person_is_asked_until_the_answer_is_one(ferryid, log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    answers = "five\n5\n2.8\n1670\n1.8\n0\n1000\n400\n-1.8\n0\n1000\n400\n"
+    monkeypatch.setattr(sys, "stdin", _Terminal(answers))
+    monkeypatch.setattr(type(sys.stderr), "isatty", lambda self: True, raising=False)
+    run = ferryid("vessel", "new", log)
+    assert run.code == 0, run.err
+    assert "'five' is no answer here" in run.err
+    text = (log.parent / "vessel.toml").read_text(encoding="utf-8")
+    assert "FILL IN:" not in text.partition("[hull]")[2]
+    assert "position_m = [-1.8, 0]" in text
+    assert ferryid("vessel", "check", log.parent / "vessel.toml").code == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("nowhere.bag",), "no such file or folder"),
+        (("LOG", "--like", "nobody"), "no vessel profile of this name"),
+        (("LOG", "--name", "a b"), '--name: cannot be "a b"'),
+        (("LOG", "--from", "500"), "is outside the log"),
+    ],
+)
+def test_what_cannot_be_drafted_writes_nothing(ferryid, log: Path, arguments: tuple[str, ...], told: str) -> None:
+    run = ferryid("vessel", "new", *(str(log) if one == "LOG" else one for one in arguments))
+    assert run.code == 2
+    assert told in run.err
+    assert run.err.count("\n") == 1
+    assert [path.name for path in log.parent.iterdir()] == ["a.mcap"]
