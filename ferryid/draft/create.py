@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ferryid.draft.draft import draft_profile
-from ferryid.draft.write import Answers, Question, as_json, as_text, draft_text, questions
+from ferryid.draft.write import Answers, Question, answered, as_json, as_text, draft_text, questions
 from ferryid.errors import FerryIdError
 from ferryid.files import replacing
 from ferryid.types import TimeRanges
@@ -79,7 +79,8 @@ def new_profile(
                 f"{question.key}: {answer!r} does not answer it ({question.text}). Fix: answer it, or with nothing"
             )
         values[question.key] = answer
-    text = draft_text(draft, Answers(named, values))
+    answers = Answers(named, values)
+    draft, text = answered(draft, answers), draft_text(draft, answers)
     if str(place) != "-":
         with replacing(place, new=not overwrite) as temporary:
             temporary.write_text(text, encoding="utf-8")

@@ -80,6 +80,10 @@ def navigation_signals(groups: Sequence[FieldGroup], samples: Samples) -> tuple[
     rate = _yaw_rate(groups, samples, slope, pose.heading)
     if rate is not None:
         found.append(rate)
+        # A heading that is interpolated across north has slopes that no vessel has.
+        turn = KINDS["rate"][rate.unit] * (1.0 if rate.frame == "FRD" else -1.0)
+        column = samples.raw(rate.topic, rate.fields[0])
+        slope = samples.smooth(samples.on_grid(rate.topic, column), rate.topic) * turn
     return found, Motion(motion_u, motion_v, slope, pose.psi)
 
 

@@ -19,6 +19,22 @@ MARK = "# FILL IN:"
 """How a line begins that a person has to complete."""
 
 
+_RUDDER = (
+    ("diameter_m", "diameter of the propeller [m]", "0.2", "of the propeller"),
+    ("area_m2", "area of the rudder [m²]", "0.05", ""),
+    ("aspect_ratio", "height of the rudder over its mean chord", "1.5", ""),
+    (
+        "rudder_x_m",
+        "place of the rudder, metres ahead of midship (negative astern)",
+        "-2.5",
+        "of the rudder, ahead of midship",
+    ),
+)
+"""What a propeller with a rudder needs: key, question, hint, and the comment beside it."""
+_ANY_SIGN = ("x_m", "y_m")
+"""Ends of keys whose answer may be negative or zero."""
+
+
 @dataclass(frozen=True)
 class Question:
     """What only a person knows: the key under which the answer is kept, the words, and what stands in the marked line."""
@@ -35,9 +51,10 @@ class Question:
         if self.key.endswith(".order"):
             return answer[0] in "om"
         try:
-            return math.isfinite(float(answer))
+            value = float(answer)
         except ValueError:
             return False
+        return math.isfinite(value) and (value > 0.0 or self.key.endswith(_ANY_SIGN))
 
 
 @dataclass(frozen=True)
@@ -119,11 +136,32 @@ def questions(draft: Draft) -> list[Question]:
                 Question(f"{one.name}.full", f"{one.name}: a speed [rpm] at which its thrust is known", "1000")
             )
             asked.append(Question(f"{one.name}.thrust", f"{one.name}: its thrust ahead at that speed [N]", "500"))
+        if one.kind == "propeller_rudder":
+            asked += [Question(f"{one.name}.{key}", f"{one.name}: {what}", hint) for key, what, hint, _ in _RUDDER]
+        if any(signal.unit == "%" for signal in one.signals):
+            asked.append(Question(f"{one.name}.full_rpm", f"{one.name}: its speed at full power [rpm]", "1000"))
     return asked
+
+
+def answered(draft: Draft, answers: Answers) -> Draft:
+    """Return a draft whose signals are orders, or measured, as a person answered."""
+
+    def settled(name: str, signal: MappedSignal) -> MappedSignal:
+        answer = answers.values.get(f"{name}.order", "").strip().lower()
+        if UNKNOWN_ORDER not in signal.doubts or not answer:
+            return signal
+        ordered = as_order(signal)
+        return ordered if answer.startswith("o") else replace(ordered, quantity=signal.quantity)
+
+    actuators = (
+        replace(one, signals=tuple(settled(one.name, signal) for signal in one.signals)) for one in draft.actuators
+    )
+    return replace(draft, actuators=tuple(actuators))
 
 
 def draft_text(draft: Draft, answers: Answers) -> str:
     """Return a draft as TOML; what was not answered is a marked comment."""
+    draft = answered(draft, answers)
     like = draft.like
     lines = [
         'schema = "ferryid.vessel/1"',
@@ -145,7 +183,7 @@ def draft_text(draft: Draft, answers: Answers) -> str:
     if like is not None:
         lines += _unmapped(draft, like.actuators)
     for signal in draft.every:
-        lines += _signal(_answered(signal, answers))
+        lines += _signal(signal, answers)
     if draft.unused:
         lines += ["", "# Topics of which nothing is mapped:", *(f"#   {name}" for name in draft.unused)]
     return "\n".join(lines) + "\n"
@@ -190,7 +228,7 @@ def _actuator(one: DraftedActuator, answers: Answers) -> list[str]:
     if one.kind == "force":
         return [*lines, ""]
     if one.kind == "propeller_rudder":
-        lines.append(f"{MARK} diameter_m = 0.2    # of the propeller")
+        lines.append(_entry(answers, f"{one.name}.diameter_m", "diameter_m", "0.2", "of the propeller"))
     full, thrust = _number(answers, f"{one.name}.full"), _number(answers, f"{one.name}.thrust")
     lines += ["", "[actuator.thrust]", 'kind = "quadratic"    # a bollard pull as a table is better', 'input = "rpm"']
     if full and thrust:
@@ -200,12 +238,10 @@ def _actuator(one: DraftedActuator, answers: Answers) -> list[str]:
     else:
         lines.append(f"{MARK} ahead = 5e-4    # thrust [N] over the square of the speed [rpm]")
     if one.kind == "propeller_rudder":
+        lines += ["", "[actuator.rudder]"]
         lines += [
-            "",
-            "[actuator.rudder]",
-            f"{MARK} area_m2 = 0.05",
-            f"{MARK} aspect_ratio = 1.5",
-            f"{MARK} x_m = -2.5    # of the rudder, ahead of midship",
+            _entry(answers, f"{one.name}.{key}", key.removeprefix("rudder_"), hint, what)
+            for key, _, hint, what in _RUDDER[1:]
         ]
     return [*lines, ""]
 
@@ -242,16 +278,7 @@ def _unmapped(draft: Draft, actuators: Sequence[Actuator]) -> list[str]:
     ]
 
 
-def _answered(signal: MappedSignal, answers: Answers) -> MappedSignal:
-    """Return a signal as an order, or as measured, where that was asked and answered."""
-    answer = answers.values.get(f"{signal.quantity.partition('.')[0]}.order", "").strip().lower()
-    if UNKNOWN_ORDER not in signal.doubts or not answer:
-        return signal
-    ordered = as_order(signal)
-    return ordered if answer.startswith("o") else replace(ordered, quantity=signal.quantity)
-
-
-def _signal(signal: MappedSignal) -> list[str]:
+def _signal(signal: MappedSignal, answers: Answers) -> list[str]:
     name = signal.quantity if re.fullmatch(r"[A-Za-z0-9_]+", signal.quantity) else f'"{signal.quantity}"'
     lines = ["", *(f"# {one[:1].upper()}{one[1:]}." for one in signal.evidence)]
     lines += [f"# CHECK: {one}." for one in signal.doubts]
@@ -267,7 +294,8 @@ def _signal(signal: MappedSignal) -> list[str]:
     if signal.unit != "quaternion":
         lines.append(f"unit = {_text(signal.unit)}")
     if signal.unit == "%":
-        lines.append(f"{MARK} full_rpm = 1000.0    # speed at full power")
+        key = f"{signal.quantity.partition('.')[0]}.full_rpm"
+        lines.append(_entry(answers, key, "full_rpm", "1000.0", "speed at full power"))
     lines += [f"{key} = {_text(value)}" for key, value in signal.options]
     if signal.frame:
         lines.append(f"frame = {_text(signal.frame)}")

@@ -235,8 +235,20 @@ def test_answers_complete_a_draft(tmp_path: Path) -> None:
     profile = parse_profile(draft_text(draft, Answers("boat", values)), "boat.toml")
     assert profile.hull.mass_kg == 1670.0
     assert profile.actuators[1].position_m == (-1.8, 1.8)
-    assert not Question("length_m", "", "").accepts("five")
+    assert not any(Question("thruster1.full", "", "").accepts(one) for one in ("five", "0", "-3", "inf"))
+    assert Question("thruster1.x_m", "", "").accepts("-1.8")
     assert Question("a.order", "", "").accepts("order")
+
+
+def test_a_propeller_with_a_rudder_is_asked_for_both(tmp_path: Path) -> None:
+    draft, _ = drafted(tmp_path, in_ned(sailed()))
+    values = {
+        one.key: "-2" if one.key.endswith("x_m") else "measured" if one.key.endswith("order") else "1.5"
+        for one in questions(draft)
+    }
+    profile = parse_profile(draft_text(draft, Answers("boat", values)), "boat.toml")
+    assert (profile.actuators[0].kind, profile.actuators[0].rudder["x_m"]) == ("propeller_rudder", -2.0)
+    assert profile.actuators[0].inflow["diameter_m"] == 1.5
 
 
 def test_an_answer_makes_an_order_of_a_signal(tmp_path: Path) -> None:
