@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ferryid.cli.options import From, Json, To, ranges
+from ferryid.cli.options import From, Json, To, ranges, vessel_names
 from ferryid.cli.output import emit, progress, tell
 
 if TYPE_CHECKING:
@@ -20,7 +20,12 @@ app = typer.Typer(
     rich_markup_mode=None,
     add_completion=False,
 )
-File = Annotated[str, typer.Argument(help="Path of a profile (TOML), or the name of one: see ferryid vessel list.")]
+File = Annotated[
+    str,
+    typer.Argument(
+        autocompletion=vessel_names, help="Path of a profile (TOML), or the name of one: see ferryid vessel list."
+    ),
+]
 
 
 @app.command()
@@ -29,7 +34,9 @@ def new(
     like: Annotated[
         str | None,
         typer.Option(
-            "--like", help="Profile to take hull, thrust and the layout of tables from: a name, or a TOML file."
+            "--like",
+            autocompletion=vessel_names,
+            help="Profile to take hull, thrust and the layout of tables from: a name, or a TOML file.",
         ),
     ] = None,
     name: Annotated[str, typer.Option(help="Name of the vessel; of the log's folder if left out.")] = "",

@@ -19,10 +19,20 @@ MaybeLogs = Annotated[
     list[str] | None,
     typer.Argument(help="Bags, MCAP files, CSV or Parquet tables, or folders; parts of one log joined by +."),
 ]
+
+
+def vessel_names(incomplete: str) -> list[str]:
+    """Return the names of profiles that begin so, for the completion of a shell."""
+    from ferryid.vessel import known
+
+    return [name for name in known() if name.startswith(incomplete)]
+
+
 Vessel = Annotated[
     str | None,
     typer.Option(
         "--vessel",
+        autocompletion=vessel_names,
         help="Vessel profile: a name, or the path of a TOML file; found by the logs if left out (vessel.toml or ferryid.toml "
         "beside them or above, $FERRYID_VESSEL, or the one profile that fits).",
     ),
@@ -30,7 +40,9 @@ Vessel = Annotated[
 ModelVessel = Annotated[
     str | None,
     typer.Option(
-        "--vessel", help="Vessel profile of the logs, in place of the model's: a name, or the path of a TOML file."
+        "--vessel",
+        autocompletion=vessel_names,
+        help="Vessel profile of the logs, in place of the model's: a name, or the path of a TOML file.",
     ),
 ]
 Out = Annotated[Path, typer.Option("--out", help="Folder for tables, models and reports.")]

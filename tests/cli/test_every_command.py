@@ -48,7 +48,12 @@ def test_has_help_and_is_documented(ferryid, command: str) -> None:
 
 def test_shell_completion_knows_commands_and_options(ferryid, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("_FERRYID_COMPLETE", "complete_bash")
-    for typed, offered in (("ferryid s", ["simulate", "sweep"]), ("ferryid sweep --win", ["--windows", "--window"])):
+    for typed, offered in (
+        ("ferryid s", ["simulate", "sweep"]),
+        ("ferryid sweep --win", ["--windows", "--window"]),
+        ("ferryid fit --vessel re", ["revolt"]),
+        ("ferryid vessel new --like es", ["esso-osaka"]),
+    ):
         monkeypatch.setenv("COMP_WORDS", typed)
         monkeypatch.setenv("COMP_CWORD", str(typed.count(" ")))
         assert ferryid().out.split() == offered
