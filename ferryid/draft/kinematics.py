@@ -11,7 +11,7 @@ import numpy as np
 
 from ferryid.draft.fields import FieldGroup
 from ferryid.draft.mapped import MappedSignal, Motion, nearest_unit
-from ferryid.draft.samples import Samples, metres, yaw
+from ferryid.draft.samples import Samples, geodetic_unit, metres, yaw
 from ferryid.draft.thresholds import DRAFT
 from ferryid.errors import FerryIdError
 from ferryid.types import Flags, Floats
@@ -32,6 +32,7 @@ class _Pose:
     position: FieldGroup | None
     heading: FieldGroup
     position_frame: str
+    position_unit: str
     heading_frame: str
     heading_unit: str
     north: Floats
@@ -173,20 +174,25 @@ def _poses(position: FieldGroup | None, heading: FieldGroup, samples: Samples) -
     unknown = np.full(samples.grid_s.shape, np.nan)
     if position is None:
         sides = [("", unknown, unknown)]
+        metre = ""
     elif position.form == "geodetic":
         slopes = [
             samples.slope(samples.on_grid(position.topic, one), position.topic)
             for one in metres(samples, position.topic, position.fields)
         ]
         sides = [("geodetic", slopes[0], slopes[1])]
+        metre = geodetic_unit(samples, position.topic, position.fields)
     else:
         first, second = (
             samples.slope(samples.on_grid(position.topic, samples.raw(position.topic, path)), position.topic)
             for path in position.fields
         )
         sides = [("NED", first, second), ("ENU", second, first)]
+        metre = "m"
     return [
-        _Pose(position, heading, frame, other, unit, north, east, 0.5 * np.pi - angle if other == "ENU" else angle)
+        _Pose(
+            position, heading, frame, metre, other, unit, north, east, 0.5 * np.pi - angle if other == "ENU" else angle
+        )
         for (frame, north, east), other in product(sides, _WORLD)
     ]
 
@@ -269,15 +275,13 @@ def _position(pose: _Pose, chosen: _Agreement, named: str) -> MappedSignal:
     position = pose.position
     assert position is not None
     if position.form == "geodetic":
-        unit = "deg"
-        return MappedSignal(
-            "position", position.topic, position.fields, unit, "geodetic", 1.0, ("latitude and longitude",)
-        )
+        shown = f"latitude and longitude by their names; {_shown(chosen)}"
+        return MappedSignal("position", position.topic, position.fields, pose.position_unit, "geodetic", 1.0, (shown,))
     return MappedSignal(
         "position",
         position.topic,
         position.fields,
-        "m",
+        pose.position_unit,
         pose.position_frame,
         1.0,
         (_shown(chosen),),

@@ -128,11 +128,17 @@ def read_samples(reader: Reader, wanted: Mapping[str, Sequence[str]], log: str, 
     return Samples(times_s, columns, grid, start)
 
 
+def geodetic_unit(samples: Samples, topic: str, fields: Sequence[str]) -> str:
+    """Return the unit of a latitude and a longitude: what never leaves a turn in radians is in radians."""
+    latitude, longitude = (np.abs(samples.raw(topic, path)) for path in fields)
+    return "rad" if np.nanmax(latitude) <= 0.5 * np.pi and np.nanmax(longitude) <= np.pi else "deg"
+
+
 def metres(samples: Samples, topic: str, fields: Sequence[str]) -> tuple[Floats, Floats]:
     """Return north and east of latitudes and longitudes [m]."""
     latitude, longitude = (samples.raw(topic, path).copy() for path in fields)
     lost = (latitude == 0.0) & (longitude == 0.0)
-    turn = 1.0 if np.nanmax(np.abs(latitude)) <= 0.5 * np.pi else np.pi / 180.0
+    turn = 1.0 if geodetic_unit(samples, topic, fields) == "rad" else np.pi / 180.0
     latitude[lost] = longitude[lost] = np.nan
     north, east = np.full(latitude.shape, np.nan), np.full(latitude.shape, np.nan)
     known = np.isfinite(latitude) & np.isfinite(longitude)

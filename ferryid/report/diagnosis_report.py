@@ -46,7 +46,7 @@ def patient(vessel: str | Path | Profile | None, model: str | None, out: Path) -
     if loaded is None:
         if not vessel:
             raise FerryIdError(
-                "diagnose: neither a vessel nor a model is given. Fix: give --vessel a profile's name or a TOML file"
+                "diagnose: neither --vessel nor --model is given. Fix: give --vessel a profile's name or a TOML file"
             )
         return _profile(vessel), None
     own = parse_profile(loaded.profile_text, loaded.name)

@@ -128,6 +128,13 @@ def test_units_and_frames_show_in_the_motion(
     assert all(found[name].evidence for name in expected)
 
 
+def test_latitude_and_longitude_in_radians(tmp_path: Path) -> None:
+    columns = in_latitude_and_enu(sailed())
+    columns |= {name: np.radians(columns[name]) for name in ("latitude", "longitude")}
+    _, found = drafted(tmp_path, columns)
+    assert (found["position"].unit, found["velocity"].unit, found["velocity"].frame) == ("rad", "m/s", "ENU")
+
+
 def test_a_rudder_that_is_positive_to_port_has_its_sign_reversed(tmp_path: Path) -> None:
     _, found = drafted(tmp_path, in_degrees_and_knots(sailed()))
     assert (found["propeller.rudder"].sign, found["propeller.rudder"].unit) == (-1.0, "deg")
