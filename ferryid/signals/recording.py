@@ -8,6 +8,8 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError
 from ferryid.ingest import log_suffixes, open_log
@@ -16,11 +18,12 @@ from ferryid.ingest.hashing import content_hash
 from ferryid.ingest.log import Reader, Series, Topic
 from ferryid.signals import cache
 from ferryid.signals.data_quality import data_quality, grouped_notes, loss_sentence, main_loss
+from ferryid.signals.empty_streams import without_empty
 from ferryid.signals.stream import Recording, Stream
 from ferryid.signals.time_ranges import cut
 from ferryid.types import Nanoseconds, TimeRanges
 from ferryid.vessel.profile import Profile
-from ferryid.vessel.signal_map import Selection, convert, select
+from ferryid.vessel.signal_map import Selection, convert, select, stream_name
 
 __all__ = ["Recording", "Stream", "data_quality", "log_name", "make_recording", "name_of", "read_recording", "record"]
 
@@ -131,13 +134,18 @@ def make_recording(
     FerryIdError
         Where no mapped topic has a row, or a field is not what the profile says.
     """
-    streams = {topic: _stream(profile, series[topic], *repaired[topic]) for topic in selection.wanted}
+    streams = {
+        stream_name(topic, where): _stream(profile, series[topic], *repaired[topic], where)
+        for topic in selection.wanted
+        for where in _choices(profile, topic)
+    }
+    chosen = any(signal.where for signal in profile.signals)
     if not any(len(stream.time_ns) for stream in streams.values()):
         raise FerryIdError(
             f"{name_of(reader)}: none of the mapped topics holds a row, looked at {', '.join(sorted(streams))}. "
             "Fix: pass a log that was recorded with these topics running"
         )
-    return Recording(
+    whole = Recording(
         name=name,
         files=tuple(str(path) for path in reader.paths),
         sha256="",
@@ -150,15 +158,33 @@ def make_recording(
         missing=dict(selection.missing),
         notes=_log_notes(streams, selection, reader.topics),
     )
+    return without_empty(whole, profile, "", "correct where in the signal map") if chosen else whole
 
 
-def _stream(profile: Profile, series: Series, time_ns: Nanoseconds, rows: Rows, clock: ClockReport) -> Stream:
-    if clock.dropped or clock.out_of_order:
+def _choices(profile: Profile, topic: str) -> list[tuple[tuple[str, float], ...]]:
+    """Return by what the messages of a topic are chosen, each once; that they are not is one of it."""
+    bare = topic.strip("/")
+    return list(dict.fromkeys(signal.where for signal in profile.signals if signal.topic.strip("/") == bare))
+
+
+def _stream(
+    profile: Profile,
+    series: Series,
+    time_ns: Nanoseconds,
+    rows: Rows,
+    clock: ClockReport,
+    where: tuple[tuple[str, float], ...],
+) -> Stream:
+    if where:
+        kept = np.all([series.columns[path][rows] == value for path, value in where], axis=0)
+        time_ns, rows = time_ns[kept], rows[kept]
+        clock = replace(clock, count=len(rows), rate_hz=clock.rate_hz * len(rows) / max(len(kept), 1), gaps=())
+    if clock.dropped or clock.out_of_order or where:
         # Only now are rows copied: nearly every topic is in order and keeps its arrays.
         columns = {path: values[rows] for path, values in series.columns.items()}
         series = Series(series.topic, series.receive_ns[rows], None, columns)
     receive_ns = time_ns if clock.source == "receive" else series.receive_ns
-    return Stream(series.topic, time_ns, convert(profile, series), clock, receive_ns)
+    return Stream(stream_name(series.topic, where), time_ns, convert(profile, series, where), clock, receive_ns)
 
 
 def _log_notes(streams: Mapping[str, Stream], selection: Selection, topics: tuple[Topic, ...]) -> tuple[str, ...]:

@@ -11,12 +11,12 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 
 from ferryid.errors import FerryIdError
+from ferryid.signals.empty_streams import without_empty
 from ferryid.signals.source import on_change
 from ferryid.signals.stream import Recording, Stream
 from ferryid.signals.thresholds import SIGNALS
 from ferryid.types import Nanoseconds, TimeRange, TimeRanges
 from ferryid.vessel.profile import Profile
-from ferryid.vessel.signal_map import Selection, lacking_signals
 
 _CLOCK = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{2}(?:\.\d+)?))?")
 _MARK = "#t="
@@ -109,31 +109,13 @@ def cut(recording: Recording, profile: Profile, ranges: TimeRanges) -> Recording
     if not ranges:
         return recording
     spans = spans_of(recording.name, recording.start_ns, recording.end_ns, ranges)
-    streams: dict[str, Stream] = {}
-    missing, found = dict(recording.missing), dict(recording.found)
     shown = _shown(spans, recording.start_ns)
-    for topic, stream in recording.streams.items():
-        kept = _cut_stream(stream, spans)
-        if len(kept.time_ns):
-            streams[topic] = kept
-            continue
-        for column in stream.columns:
-            found.pop(column, None)
-        emptied = [one.quantity for one in profile.signals if one.topic.strip("/") == topic.strip("/")]
-        missing |= dict.fromkeys(emptied, f"{topic} holds no row in {shown}")
-    lacking = lacking_signals(profile, Selection({}, found, missing))
-    if lacking:
-        raise FerryIdError(
-            f"{recording.name}: {lacking[0].quantity} is needed by the profile {profile.name}, "
-            f"{missing[lacking[0].quantity]}. Fix: widen --from and --to"
-        )
+    kept = {topic: _cut_stream(stream, spans) for topic, stream in recording.streams.items()}
+    part = without_empty(replace(recording, streams=kept), profile, f" in {shown}", "widen --from and --to")
     length_s = (recording.end_ns - recording.start_ns) * 1e-9
     return replace(
-        recording,
+        part,
         sha256=f"{recording.sha256}{_MARK}{_fragment(spans, recording.start_ns)}",
-        streams=streams,
-        found=found,
-        missing=missing,
         notes=(f"{USED} {shown} of {length_s:.1f} s, as asked for (--from, --to).", *recording.notes),
     )
 

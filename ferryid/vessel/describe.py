@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ferryid.vessel.profile import Actuator, Profile, Signal
-from ferryid.vessel.signal_map import canonical_columns
+from ferryid.vessel.signal_map import canonical_columns, stream_name
 
 
 def describe(profile: Profile) -> str:
@@ -75,7 +75,7 @@ def _signals(profile: Profile) -> list[str]:
         (
             signal.quantity,
             ", ".join(canonical_columns(signal)),
-            f"{signal.topic}: {_fields(signal)}",
+            f"{stream_name(signal.topic, signal.where)}: {_fields(signal)}",
             _how(signal),
         )
         for signal in profile.signals

@@ -15,6 +15,7 @@ VESSEL_QUANTITIES = (
     *("wind", "current", "payload", "tau_d", "position_d", "heading_d"),
 )
 ROLE_KINDS = {"speed": "rotation", "angle": "angle", "rudder": "angle", "force": "force", "thrust": "force"}
+Where = tuple[tuple[str, float], ...]
 _OPTIONAL = ("wind", "current", "payload", "tau_d", "position_d", "heading_d", "roll", "pitch")
 
 
@@ -27,7 +28,7 @@ def parse_signals(
     by_name = {actuator.name: actuator for actuator in actuators}
     before = len(faults)
     signals: list[Signal] = []
-    read: dict[tuple[str, str], Signal] = {}
+    read: dict[tuple[str, str, Where], Signal] = {}
     for quantity in reader.data:
         table = reader.table(quantity)
         if table is None:
@@ -97,6 +98,7 @@ def _vessel_signal(quantity: str, table: TableReader) -> Signal | None:
         if surge_alone:
             _check_surge(table, frame)
     required = table.flag("required", quantity not in _OPTIONAL)
+    where = _where(table)
     table.close()
     return Signal(
         quantity=quantity,
@@ -110,6 +112,7 @@ def _vessel_signal(quantity: str, table: TableReader) -> Signal | None:
         required=required,
         line=table.line(),
         mount_m=mount_m,
+        where=where,
     )
 
 
@@ -194,6 +197,7 @@ def _actuator_signal(quantity: str, table: TableReader, actuators: dict[str, Act
     sign, offset = _sign(table), table.number("offset", 0.0)
     required = table.flag("required", not quantity.endswith(".command"))
     table.has("shared")
+    where = _where(table)
     table.close()
     return Signal(
         quantity=quantity,
@@ -205,7 +209,20 @@ def _actuator_signal(quantity: str, table: TableReader, actuators: dict[str, Act
         required=required,
         line=table.line(),
         full_rpm=full_rpm,
+        where=where,
     )
+
+
+def _where(table: TableReader) -> tuple[tuple[str, float], ...]:
+    """Take the fields and values of the messages that hold a signal, on a topic that carries several."""
+    chosen = table.table("where")
+    if chosen is None:
+        return ()
+    if not chosen.data:
+        table.fault('"where" names no field. Fix: where = { MsgID = 5 }, or leave it out', "where")
+    found = tuple((path, chosen.number(path)) for path in sorted(chosen.data))
+    chosen.close()
+    return found
 
 
 def _unit(table: TableReader, kind: str, key: str = "unit", *, default: str = "") -> str:
@@ -256,7 +273,7 @@ def _mount(table: TableReader) -> tuple[float, float]:
     return (place[0], place[1]) if place else (0.0, 0.0)
 
 
-def _check_own_fields(table: TableReader, signal: Signal, read: dict[tuple[str, str], Signal]) -> None:
+def _check_own_fields(table: TableReader, signal: Signal, read: dict[tuple[str, str, Where], Signal]) -> None:
     """Note a field that is read twice: lines that were copied and not changed.
 
     Two actuators may follow one signal where the file says so, and the commanded force may be the order of the only one.
@@ -266,7 +283,7 @@ def _check_own_fields(table: TableReader, signal: Signal, read: dict[tuple[str, 
     name, _, rest = signal.quantity.partition(".")
     may_share = bool(rest) and table.flag("shared", False)
     for place, path in enumerate(signal.fields):
-        other = read.setdefault((signal.topic.strip("/"), path), signal)
+        other = read.setdefault((signal.topic.strip("/"), path, signal.where), signal)
         if not path or (other is signal and path not in signal.fields[:place]):
             continue
         other_name, _, other_rest = other.quantity.partition(".")

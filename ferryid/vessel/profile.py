@@ -102,7 +102,7 @@ class Signal:
     ``<actuator>.<speed|angle|rudder|force|thrust>`` with ``.command`` appended for orders); `line` is its line there.
     A scalar is ``sign * value + offset`` in `unit`, and a propeller speed in ``%`` or ``fraction`` is of `full_rpm`.
     `mount_m` is where an antenna or a log sits, or a payload whose place is not measured (x forward, y starboard of the
-    body origin) [m].
+    body origin) [m]. On a topic of several signals `where` chooses its messages: fields and their values.
     """
 
     quantity: str
@@ -117,6 +117,7 @@ class Signal:
     line: int = 0
     full_rpm: float = 0.0
     mount_m: tuple[float, float] = (0.0, 0.0)
+    where: tuple[tuple[str, float], ...] = ()
 
 
 SETTINGS = ("tank", "pond", "harbour", "sea")

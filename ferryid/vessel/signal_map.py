@@ -95,7 +95,7 @@ def survey(profile: Profile, topics: Sequence[Topic], losses: Sequence[Loss] = (
             missing[signal.quantity] = reason
             continue
         paths = wanted.setdefault(topic.name, [])
-        paths.extend(path for path in signal.fields if path not in paths)
+        paths.extend(path for path in _read_fields(signal) if path not in paths)
         columns = canonical_columns(signal)
         shown = signal.fields if len(columns) == len(signal.fields) else (", ".join(signal.fields),)
         found.update({column: f"{topic.name}: {path}" for column, path in zip(columns, shown, strict=True)})
@@ -166,7 +166,22 @@ def select(profile: Profile, topics: Sequence[Topic], where: str, losses: Sequen
     return selection
 
 
-def convert(profile: Profile, series: Series) -> dict[str, Floats]:
+def stream_name(topic: str, where: tuple[tuple[str, float], ...]) -> str:
+    """Return the name of the messages of a topic that hold a signal: the topic's, with what they are chosen by."""
+    chosen = " and ".join(f"{path} = {value:g}" for path, value in where)
+    return f"{topic} where {chosen}" if chosen else topic
+
+
+def is_in(signal: Signal, stream: str) -> bool:
+    """Tell whether a signal is in the messages of that name."""
+    return _bare(stream_name(signal.topic, signal.where)) == _bare(stream)
+
+
+def _read_fields(signal: Signal) -> tuple[str, ...]:
+    return (*signal.fields, *(path for path, _ in signal.where))
+
+
+def convert(profile: Profile, series: Series, where: tuple[tuple[str, float], ...] = ()) -> dict[str, Floats]:
     """Turn the fields of one topic into canonical columns in SI units; frames that need another signal come later.
 
     Parameters
@@ -174,7 +189,9 @@ def convert(profile: Profile, series: Series) -> dict[str, Floats]:
     profile
         Vessel profile.
     series
-        Decoded fields of one topic, n messages.
+        Decoded fields of one topic, n messages; with `where` those that hold such signals alone.
+    where
+        What the messages are chosen by: signals with another choice are left out.
 
     Returns
     -------
@@ -188,7 +205,9 @@ def convert(profile: Profile, series: Series) -> dict[str, Floats]:
     """
     columns: dict[str, Floats] = {}
     for signal in profile.signals:
-        if _bare(signal.topic) != _bare(series.topic) or not set(signal.fields) <= set(series.columns):
+        if _bare(signal.topic) != _bare(series.topic) or signal.where != where:
+            continue
+        if not set(signal.fields) <= set(series.columns):
             continue
         values = [_numeric(series, path, signal) for path in signal.fields]
         _check_turns(profile, signal, values)
@@ -333,7 +352,7 @@ def _fault(signal: Signal, topic: Topic | None, topics: Sequence[Topic], losses:
         return f'found no topic "{signal.topic}".{hint}'
     if topic.count == 0:
         return f"found {topic.name} without a single message"
-    for path in signal.fields:
+    for path in _read_fields(signal):
         kind = _field_type(path, topic)
         if kind is None:
             return (
