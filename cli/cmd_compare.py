@@ -47,6 +47,6 @@ def command(
         command=words,
         progress=progress,
         ranges=ranges(from_, to),
-        tell=tell,
+        announce=tell,
     )
     emit(outcome, json)

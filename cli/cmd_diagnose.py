@@ -70,7 +70,7 @@ def command(
     if versus:
         outcome = api.compare_groups(
             logs, versus, vessel or None, out, model=model, settings=settings, name=name, command=words, verify=verify,
-            ranges=used, progress=progress, tell=tell,
+            ranges=used, progress=progress, announce=tell,
         )  # fmt: skip
         emit(outcome, json)
         return
@@ -85,6 +85,6 @@ def command(
         verify=verify,
         ranges=used,
         progress=progress,
-        tell=tell,
+        announce=tell,
     )
     emit(outcome, json)

@@ -26,6 +26,13 @@ def command(
     from ferryid import api
 
     outcome = api.evaluate(
-        model, logs, out, vessel=vessel or None, window_s=window, ranges=ranges(from_, to), progress=progress, tell=tell
+        model,
+        logs,
+        out,
+        vessel=vessel or None,
+        window_s=window,
+        ranges=ranges(from_, to),
+        progress=progress,
+        announce=tell,
     )
     emit(outcome, json)

@@ -37,7 +37,7 @@ def command(
     outcome = api.export(
         what, out, to=to if mcap is None else None, file=file, mcap=mcap, model=model, vessel=vessel or None,
         diagnosis=diagnosis, overwrite=overwrite, json=None if json in (None, "-") else Path(json), ranges=used,
-        progress=progress, tell=tell,
+        progress=progress, announce=tell,
     )  # fmt: skip
     for note in notes(outcome.json):
         tell(f"ferryid: {note}")

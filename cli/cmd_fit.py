@@ -92,7 +92,7 @@ def command(
         verify=verify,
         ranges=ranges(from_, to),
         progress=progress,
-        tell=tell,
+        announce=tell,
     )
     emit(outcome, json)
     if require_accept and not outcome.accepted:

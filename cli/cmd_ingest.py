@@ -19,6 +19,8 @@ def command(
     from ferryid import api
 
     emit(
-        api.ingest(logs, vessel or None, out, verify=verify, ranges=ranges(from_, to), progress=progress, tell=tell),
+        api.ingest(
+            logs, vessel or None, out, verify=verify, ranges=ranges(from_, to), progress=progress, announce=tell
+        ),
         json,
     )

@@ -21,4 +21,7 @@ def command(
     """Show topics, types, counts, rates, gaps, clocks, and the signals that a vessel profile finds."""
     from ferryid import api
 
-    emit(api.inspect(log, vessel or None, verify=verify, ranges=ranges(from_, to), width=text_width(), tell=tell), json)
+    emit(
+        api.inspect(log, vessel or None, verify=verify, ranges=ranges(from_, to), width=text_width(), announce=tell),
+        json,
+    )

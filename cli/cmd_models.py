@@ -50,7 +50,7 @@ def command(
             ranges=ranges(from_, to),
             force=force,
             progress=progress,
-            tell=tell,
+            announce=tell,
         )
         emit(promoted, json)
         if not promoted.json["promoted"]:

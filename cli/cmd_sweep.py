@@ -84,6 +84,6 @@ def command(
         archive=archive,
         ranges=ranges(from_, to),
         progress=progress,
-        tell=tell,
+        announce=tell,
     )
     emit(outcome, json)

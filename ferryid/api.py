@@ -82,42 +82,42 @@ def _profile(vessel: str | Path | Profile) -> Profile:
     return vessel if isinstance(vessel, Profile) else load_profile(str(vessel))
 
 
-def _told(choice: VesselChoice | None, tell: Progress) -> Profile | None:
-    """Return the profile of a choice, and tell it where it was not asked for."""
+def _told(choice: VesselChoice | None, announce: Progress) -> Profile | None:
+    """Return the profile of a choice, and announce it where it was not asked for."""
     if choice is not None and choice.reason:
-        tell(choice.reason)
+        announce(choice.reason)
     return None if choice is None else choice.profile
 
 
-def _chosen(logs: Sequence[str], vessel: str | Path | Profile | None, tell: Progress) -> Profile:
-    """Return the vessel of logs, and tell which one was found where it was not asked for."""
+def _chosen(logs: Sequence[str], vessel: str | Path | Profile | None, announce: Progress) -> Profile:
+    """Return the vessel of logs, and announce which one was found where it was not asked for."""
     from ferryid.vessel import choose_vessel
 
     choice = choose_vessel(logs, vessel)
-    _told(choice, tell)
+    _told(choice, announce)
     return choice.profile
 
 
-def _of_archive(out: Path, vessel: str | Path | Profile | None, tell: Progress) -> Profile:
-    """Return the vessel whose ingested logs are used, and tell which one was found where it was not asked for."""
+def _of_archive(out: Path, vessel: str | Path | Profile | None, announce: Progress) -> Profile:
+    """Return the vessel whose ingested logs are used, and announce which one was found where it was not asked for."""
     from ferryid.signals.ingested_vessel import ingested_vessel
 
     if vessel is not None:
         return _profile(vessel)
     choice = ingested_vessel(out)
-    _told(choice, tell)
+    _told(choice, announce)
     return choice.profile
 
 
 def _for_model(
-    model: Model, logs: Sequence[str], vessel: str | Path | Profile | None, tell: Progress
+    model: Model, logs: Sequence[str], vessel: str | Path | Profile | None, announce: Progress
 ) -> Profile | None:
     """Return the profile to read logs with beside a model; None where the model's own serves."""
     from ferryid.vessel import choose_vessel, parse_profile
 
     own = parse_profile(model.profile_text, model.name)
     choice = choose_vessel(logs, vessel, own=own)
-    _told(choice, tell)
+    _told(choice, announce)
     return None if choice.profile is own else choice.profile
 
 
@@ -158,7 +158,7 @@ def inspect(
     verify: bool = False,
     width: int = 160,
     ranges: Ranges = (),
-    tell: Progress = _quiet,
+    announce: Progress = _quiet,
 ) -> Outcome:
     """Return topics, types, counts, rates, gaps and clocks of a log, and the signals that a vessel's profile finds in it.
 
@@ -173,7 +173,7 @@ def inspect(
         Read the whole file and check every checksum.
     width
         Of the text, in characters.
-    tell
+    announce
         Called with the vessel that is stated.
     """
     from ferryid.signals.inspect import inspect as inspect_log
@@ -181,9 +181,9 @@ def inspect(
     from ferryid.vessel import stated_choice
 
     if vessel is not None or ranges:
-        profile: Profile | None = _chosen([str(log)], vessel, tell)
+        profile: Profile | None = _chosen([str(log)], vessel, announce)
     else:
-        profile = _told(stated_choice([str(log)]), tell)
+        profile = _told(stated_choice([str(log)]), announce)
     result = inspect_log(str(log), profile, verify=verify, ranges=tuple(ranges))
     return _outcome(result, render_inspect(result, width))
 
@@ -196,7 +196,7 @@ def ingest(
     verify: bool = False,
     progress: Progress = _quiet,
     ranges: Ranges = (),
-    tell: Progress = _quiet,
+    announce: Progress = _quiet,
 ) -> Outcome:
     """Read logs into Parquet tables with SNAME column names, SI units and provenance."""
     from ferryid.signals.ingest import ingest as ingest_logs
@@ -204,7 +204,7 @@ def ingest(
 
     paths = _paths(logs)
     result = ingest_logs(
-        paths, _chosen(paths, vessel, tell), Path(out), verify=verify, ranges=tuple(ranges), progress=progress
+        paths, _chosen(paths, vessel, announce), Path(out), verify=verify, ranges=tuple(ranges), progress=progress
     )
     return _outcome(result, render_ingest(result))
 
@@ -220,7 +220,7 @@ def fit(
     verify: bool = False,
     progress: Progress = _quiet,
     ranges: Ranges = (),
-    tell: Progress = _quiet,
+    announce: Progress = _quiet,
 ) -> FitReport:
     """Fit a model to logs, validate it, store it and write its report.
 
@@ -241,7 +241,7 @@ def fit(
         Fit to the sums kept of ingested logs; no log is read.
     verify
         Read whole files and check every checksum.
-    tell
+    announce
         Called with the vessel that was found.
     """
     from ferryid.identify import FitSettings
@@ -250,8 +250,8 @@ def fit(
     settings, run, paths = settings or FitSettings(), _context(out, progress, verify, ranges), _paths(logs)
     if archive:
         _refuse_ranges_of_archive(ranges)
-        return fit_archive_and_report(_of_archive(run.out, vessel, tell), settings, run, paths, name=name)
-    return fit_and_report(paths, _chosen(paths, vessel, tell), settings, run, name=name)
+        return fit_archive_and_report(_of_archive(run.out, vessel, announce), settings, run, paths, name=name)
+    return fit_and_report(paths, _chosen(paths, vessel, announce), settings, run, name=name)
 
 
 def evaluate(
@@ -263,7 +263,7 @@ def evaluate(
     window_s: float | None = None,
     progress: Progress = _quiet,
     ranges: Ranges = (),
-    tell: Progress = _quiet,
+    announce: Progress = _quiet,
 ) -> Outcome:
     """Judge a model on other logs: mean square of the force errors and R² per axis, errors of free runs.
 
@@ -274,7 +274,7 @@ def evaluate(
     from ferryid.report.evaluation_text import render_evaluation
 
     run, judged, paths = _context(out, progress, ranges=ranges), _model(model, Path(out)), _paths(logs)
-    profile = _for_model(judged, paths, vessel, tell)
+    profile = _for_model(judged, paths, vessel, announce)
     result = evaluate_model(judged, paths, run, profile=profile, window_s=window_s)
     return _outcome(result, render_evaluation(result))
 
@@ -289,7 +289,7 @@ def compare(
     command: Sequence[str] = (),
     progress: Progress = _quiet,
     ranges: Ranges = (),
-    tell: Progress = _quiet,
+    announce: Progress = _quiet,
 ) -> Report:
     """Compare models on the same rows of logs, and by their coefficients; without logs by their coefficients alone.
 
@@ -317,7 +317,7 @@ def compare(
     loaded = [load(name, run.out) for name in models]
     profile = None if vessel is None else _profile(vessel)
     if profile is None and loaded and paths:
-        profile = _for_model(loaded[0], paths, None, tell)
+        profile = _for_model(loaded[0], paths, None, announce)
     field = select_candidates(models, loaded, profile)
     comparison = compare_models(field, paths, run, window_s=window_s)
     progress("writing the report")
@@ -338,7 +338,7 @@ def sweep(
     archive: bool = False,
     progress: Progress = _quiet,
     ranges: Ranges = (),
-    tell: Progress = _quiet,
+    announce: Progress = _quiet,
 ) -> Report:
     """Cross-validate component counts, smoothing windows [s], or bases and structures, and mark which to fit with."""
     from ferryid.identify import FOLDS, FitSettings
@@ -348,7 +348,7 @@ def sweep(
     paths = _paths(logs)
     if archive:
         _refuse_ranges_of_archive(ranges)
-    profile = _of_archive(Path(out), vessel, tell) if archive else _chosen(paths, vessel, tell)
+    profile = _of_archive(Path(out), vessel, announce) if archive else _chosen(paths, vessel, announce)
     arguments = (paths, profile, settings or FitSettings(), _context(out, progress, ranges=ranges))
     given = {"windows_s": windows_s, "folds": FOLDS if folds is None else folds, "archive": archive}
     if what == "basis":
@@ -368,7 +368,7 @@ def diagnose(
     verify: bool = False,
     progress: Progress = _quiet,
     ranges: Ranges = (),
-    tell: Progress = _quiet,
+    announce: Progress = _quiet,
 ) -> Report:
     """Say which physics a model left out of recordings, what shows it, and store the model that has it.
 
@@ -395,7 +395,7 @@ def diagnose(
     from ferryid.report.diagnosis_report import diagnose_and_report
 
     paths = _paths(logs)
-    profile, examined = _examined(paths, vessel, model, out, settings, tell)
+    profile, examined = _examined(paths, vessel, model, out, settings, announce)
     run = _context(out, progress, verify, ranges)
     outcome = diagnose_and_report(paths, profile, examined, run, name=name, command=command)
     progress("")
@@ -415,7 +415,7 @@ def compare_groups(
     verify: bool = False,
     progress: Progress = _quiet,
     ranges: Ranges = (),
-    tell: Progress = _quiet,
+    announce: Progress = _quiet,
 ) -> Report:
     """Estimate in which properties and loads two groups of recordings of one vessel differ: ``diagnose LOGS --versus VERSUS``.
 
@@ -433,7 +433,7 @@ def compare_groups(
     from ferryid.report.versus_report import compare_and_report
 
     paths, others = _paths(logs), _paths(versus)
-    profile, examined = _examined([*paths, *others], vessel, model, out, settings, tell)
+    profile, examined = _examined([*paths, *others], vessel, model, out, settings, announce)
     run = _context(out, progress, verify, ranges)
     outcome = compare_and_report(paths, others, profile, examined, run, name=name, command=command)
     progress("")
@@ -446,16 +446,16 @@ def _examined(
     model: str | None,
     out: str | Path,
     settings: DiagnosisSettings | None,
-    tell: Progress,
+    announce: Progress,
 ) -> tuple[Profile, DiagnosisSettings]:
     """Return the vessel of a diagnosis, and its settings with the model that is examined."""
     from ferryid.diagnose import DiagnosisSettings
     from ferryid.report.diagnosis_report import patient
 
     if not model:
-        vessel = _chosen(logs, vessel, tell)
+        vessel = _chosen(logs, vessel, announce)
     elif not vessel:
-        vessel = _for_model(_model(model, Path(out)), logs, None, tell)
+        vessel = _for_model(_model(model, Path(out)), logs, None, announce)
     profile, examined = patient(vessel, model, Path(out))
     return profile, replace(settings or DiagnosisSettings(), model=examined)
 
@@ -499,7 +499,7 @@ def export(
     json: Path | None = None,
     progress: Progress = _quiet,
     ranges: Ranges = (),
-    tell: Progress = _quiet,
+    announce: Progress = _quiet,
 ) -> Outcome:
     """Write a model as code or parameters for other programs, or with `mcap` a log and its forces for a viewer.
 
@@ -510,7 +510,7 @@ def export(
 
     result = write_export(
         str(what), Path(out), to=to, file=file, mcap=mcap, model=model, vessel=vessel, diagnosis=diagnosis,
-        overwrite=overwrite, json=json, ranges=tuple(ranges), progress=progress, tell=tell,
+        overwrite=overwrite, json=json, ranges=tuple(ranges), progress=progress, announce=announce,
     )  # fmt: skip
     progress("")
     return _outcome(result, render_export(result))
@@ -543,7 +543,7 @@ def promote(
     force: bool = False,
     progress: Progress = _quiet,
     ranges: Ranges = (),
-    tell: Progress = _quiet,
+    announce: Progress = _quiet,
 ) -> Outcome:
     """Make a stored version the current one, after a replay of it and of the present one on logs; ``json["promoted"]`` tells.
 
@@ -566,7 +566,7 @@ def promote(
     run = _context(out, progress, ranges=ranges)
     paths, profile = _paths(on), None if vessel is None else _profile(vessel)
     if profile is None and paths and "@" in model:
-        profile = _for_model(_model(model, run.out), paths, None, tell)
+        profile = _for_model(_model(model, run.out), paths, None, announce)
     told = promote_version(model, paths, run, profile, force=force)
     progress("")
     return _outcome(*told)

@@ -6,9 +6,13 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from ferryid.draft.fields import ORDERS, numeric_fields, rate_of
+from ferryid.draft.samples import Samples
 from ferryid.ingest.log import Topic
 from ferryid.vessel.field_words import words_of
+from ferryid.vessel.signal_map import stream_name
 
 _SPEED = frozenset({"rpm", "rps", "speed", "n", "revs", "revolutions", "rotation", "shaft"})
 _ANGLE = frozenset({"azimuth", "azi", "angle", "alpha", "direction", "steering", "nozzle"})
@@ -44,6 +48,11 @@ _SIDES = (
     "centre",
     "mid",
 )
+_BUS = frozenset({"motors", "lli", "can", "bus", "serial", "servo", "servos", "actuation"})
+_SELECTORS = ("id", "channel", "index", "node", "number")
+_VALUES = ("data", "value", "val", "setpoint", "pwm", "command", "cmd")
+_MOST_SHARED = 16
+"""Actuators on one topic."""
 _FEEDBACK = frozenset({"state", "feedback", "actual", "measured", "encoder", "status"})
 _UNRELATED = frozenset(
     [
@@ -96,6 +105,8 @@ class ActuatorField:
         Where it is.
     rate_hz
         Messages per second.
+    where
+        Fields and values of the messages that are its own, on a topic that carries several actuators.
     """
 
     actuator: str
@@ -104,6 +115,12 @@ class ActuatorField:
     topic: str
     path: str
     rate_hz: float
+    where: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def stream(self) -> str:
+        """Name of its messages."""
+        return stream_name(self.topic, self.where)
 
     @property
     def label(self) -> str:
@@ -138,6 +155,52 @@ def actuator_fields(topics: Sequence[Topic]) -> list[ActuatorField]:
         # One speed and one angle without a number: one thruster.
         found = [replace(one, actuator="azimuth") for one in found]
     return found
+
+
+@dataclass(frozen=True)
+class SharedTopic:
+    """A topic whose messages are of several actuators: the fields that tell them apart, and the one with the value."""
+
+    topic: str
+    selectors: tuple[str, ...]
+    value: str
+
+
+def shared_topics(topics: Sequence[Topic]) -> list[SharedTopic]:
+    """Return topics of orders whose messages name their actuator by numbers, as those on a bus do."""
+    found = []
+    for topic in topics:
+        around = set(words_of(topic.name))
+        if topic.count < 2 or topic.name == "table" or not around & (ORDERS | _BUS | _MARKS):
+            continue
+        fields = numeric_fields(topic)
+        whole = [path for path in fields if topic.fields[path].startswith(("int", "uint"))]
+        selectors = tuple(path for path in whole if fields[path][-1] in _SELECTORS)
+        values = [path for path, words in fields.items() if words[-1] in _VALUES and path not in selectors]
+        if selectors and len(values) == 1:
+            found.append(SharedTopic(topic.name, selectors, values[0]))
+    return found
+
+
+def parted(shared: SharedTopic, samples: Samples) -> tuple[list[ActuatorField], Samples]:
+    """Return the actuators on a topic that carries several, and the samples with the messages of each apart."""
+    if any((shared.topic, path) not in samples.columns for path in (*shared.selectors, shared.value)):
+        return [], samples
+    chosen = np.column_stack([samples.raw(shared.topic, path) for path in shared.selectors])
+    values, times = samples.raw(shared.topic, shared.value), samples.times_s[shared.topic]
+    found, all_times, columns = [], dict(samples.times_s), dict(samples.columns)
+    for numbers in np.unique(chosen[np.isfinite(chosen).all(axis=1)], axis=0)[:_MOST_SHARED]:
+        rows = (chosen == numbers).all(axis=1)
+        if np.unique(values[rows]).size < 2:
+            continue
+        where = tuple(sorted(zip(shared.selectors, map(float, numbers), strict=True)))
+        telling = max(range(len(numbers)), key=lambda k: np.unique(chosen[:, k]).size)
+        word = "_".join(words_of(shared.selectors[telling])[:-1]) or "actuator"
+        rate = np.count_nonzero(rows) / max(float(np.ptp(times[rows])), 1e-9)
+        field = ActuatorField(f"{word}{numbers[telling]:g}", "duty", True, shared.topic, shared.value, rate, where)
+        all_times[field.stream], columns[field.stream, shared.value] = times[rows], values[rows]
+        found.append(field)
+    return found, replace(samples, times_s=all_times, columns=columns)
 
 
 def _split(words: Sequence[str]) -> tuple[str, ...]:

@@ -31,7 +31,7 @@ class DraftedActuator:
 
 def drafted_actuators(fields: Sequence[ActuatorField], samples: Samples, motion: Motion) -> list[DraftedActuator]:
     """Return the actuators of a log with their signals."""
-    fields = [one for one in fields if (one.topic, one.path) in samples.columns]
+    fields = [one for one in fields if (one.stream, one.path) in samples.columns]
     names = list(dict.fromkeys(one.actuator for one in fields))
     chosen = {name: _chosen([one for one in fields if one.actuator == name]) for name in names}
     chosen = {name: roles for name, roles in chosen.items() if roles}
@@ -81,7 +81,7 @@ def _kind(name: str, roles: _Roles) -> str:
 
 def _signal(name: str, kind: str, role: str, order: bool, field: ActuatorField, samples: Samples) -> MappedSignal:
     quantity = {"duty": "speed", "force": "force" if kind == "force" else "thrust"}.get(role, role)
-    values = samples.raw(field.topic, field.path)
+    values = samples.raw(field.stream, field.path)
     values = values[np.isfinite(values)]
     largest = float(np.quantile(np.abs(values), 0.99)) if values.size else 0.0
     unit, why, doubt = _unit(role, field, largest)
@@ -94,6 +94,7 @@ def _signal(name: str, kind: str, role: str, order: bool, field: ActuatorField, 
         field.topic,
         (field.path,),
         unit,
+        where=field.where,
         evidence=evidence,
         doubts=tuple(filter(None, [doubt, "" if field.order is not None else UNKNOWN_ORDER])),
     )
@@ -114,7 +115,7 @@ def _unit(role: str, field: ActuatorField, largest: float) -> tuple[str, str, st
     if kind == "force":
         return "N", shown, "the unit is assumed"
     if kind == "fraction":
-        return "%", shown, "a share of full power: give the range and the speed at full power"
+        return "%", shown, "a share of full power, or a pulse width: offset and full_rpm turn it into a speed"
     named = next((unit for unit in ("rpm", "rps") if unit in words), "")
     if named:
         return named, "in its name", ""
@@ -134,7 +135,7 @@ def _signed(signal: MappedSignal, sign: _Sign) -> MappedSignal:
 
 
 def _on_grid(field: ActuatorField, samples: Samples) -> Floats:
-    return samples.on_grid(field.topic, samples.raw(field.topic, field.path), held=True)
+    return samples.on_grid(field.stream, samples.raw(field.stream, field.path), held=True)
 
 
 def _response(cause: Floats, effect: Floats, step_s: float) -> float:
@@ -198,7 +199,7 @@ def _any(roles: _Roles, role: str) -> ActuatorField | None:
 
 
 def _largest(field: ActuatorField, samples: Samples) -> float:
-    values = samples.raw(field.topic, field.path)
+    values = samples.raw(field.stream, field.path)
     values = values[np.isfinite(values)]
     return float(np.quantile(np.abs(values), 0.99)) if values.size else 0.0
 

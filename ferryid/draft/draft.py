@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ferryid.draft.actuator_fields import actuator_fields
+from ferryid.draft.actuator_fields import actuator_fields, parted, shared_topics
 from ferryid.draft.actuators import UNKNOWN_ORDER, DraftedActuator, drafted_actuators
 from ferryid.draft.fields import navigation_groups
 from ferryid.draft.kinematics import navigation_signals
@@ -85,6 +85,10 @@ def draft_profile(log: str | Path, like: Profile | None = None, ranges: TimeRang
         wanted.setdefault(group.topic, []).extend(group.fields)
     for field in fields:
         wanted.setdefault(field.topic, []).append(field.path)
+    # What names its actuators by numbers is of use only where none has a name.
+    shared = [] if fields else shared_topics(topics)
+    for bus in shared:
+        wanted.setdefault(bus.topic, []).extend((*bus.selectors, bus.value))
     for topic, speed, direction in winds:
         wanted.setdefault(topic, []).extend((speed, direction))
     if not wanted:
@@ -92,6 +96,9 @@ def draft_profile(log: str | Path, like: Profile | None = None, ranges: TimeRang
             f"{log}: {_nothing(topics)}. Fix: write the signal map by hand, see ferryid vessel show --toml"
         )
     samples = read_samples(reader, wanted, str(log), ranges)
+    for bus in shared:
+        more, samples = parted(bus, samples)
+        fields += more
     signals, motion = navigation_signals(groups, samples)
     if not signals:
         raise FerryIdError(

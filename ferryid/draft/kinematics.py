@@ -303,7 +303,7 @@ def _mirror(pose: _Pose, named: str) -> tuple[str, ...]:
     if named or (pose.position is not None and pose.position.form == "geodetic"):
         return ()
     return (
-        "motion alone does not tell NED and FRD from their mirror image ENU and FLU: in a turn to starboard the heading rises",
+        "motion alone does not distinguish NED from its mirror image ENU: in a turn to starboard the heading has to rise",
     )
 
 

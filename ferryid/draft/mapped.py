@@ -17,7 +17,7 @@ class MappedSignal:
 
     Attributes
     ----------
-    quantity, topic, fields, unit, frame, sign
+    quantity, topic, fields, unit, frame, sign, where
         As of `ferryid.vessel.profile.Signal`.
     evidence
         What the log shows for unit, frame and sign, a sentence each.
@@ -34,6 +34,7 @@ class MappedSignal:
     evidence: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
     options: tuple[tuple[str, str], ...] = ()
+    where: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True)

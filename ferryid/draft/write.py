@@ -14,6 +14,7 @@ from ferryid.draft.actuators import UNKNOWN_ORDER, DraftedActuator
 from ferryid.draft.draft import Draft, as_order
 from ferryid.draft.mapped import MappedSignal
 from ferryid.vessel.profile import Actuator
+from ferryid.vessel.signal_map import stream_name
 
 MARK = "# FILL IN:"
 """How a line begins that a person has to complete."""
@@ -90,6 +91,7 @@ def as_json(draft: Draft, file: str, text: str) -> dict[str, Any]:
                 "evidence": list(one.evidence),
                 "check": list(one.doubts),
                 **dict(one.options),
+                **({"where": dict(one.where)} if one.where else {}),
             }
             for one in draft.every
         ],
@@ -103,7 +105,7 @@ def as_text(draft: Draft, file: str, text: str) -> str:
     lines = [f"{file}: {counted(len(draft.every), 'signal')}, {counted(len(draft.actuators), 'actuator')}"]
     for one in draft.every:
         how = ", ".join(filter(None, [one.unit, one.frame, "sign -1" if one.sign < 0.0 else ""]))
-        lines.append(f"  {one.quantity:<{wide}}  {one.topic}: {', '.join(one.fields)}  [{how}]")
+        lines.append(f"  {one.quantity:<{wide}}  {stream_name(one.topic, one.where)}: {', '.join(one.fields)}  [{how}]")
         lines += [f"  {'':<{wide}}    check: {doubt}" for doubt in one.doubts]
     count = open_lines(text)
     todo = f"fill in {counted(count, 'line')} marked {MARK.removeprefix('# ').rstrip(':')}, then " if count else ""
@@ -291,6 +293,9 @@ def _signal(signal: MappedSignal, answers: Answers) -> list[str]:
         lines.append(f"field = {_text(signal.fields[0])}")
     else:
         lines.append(f"fields = [{', '.join(map(_text, signal.fields))}]")
+    if signal.where:
+        chosen = ", ".join(f"{_key(path)} = {value:g}" for path, value in signal.where)
+        lines.append(f"where = {{ {chosen} }}")
     if signal.unit != "quaternion":
         lines.append(f"unit = {_text(signal.unit)}")
     if signal.unit == "%":
@@ -302,6 +307,10 @@ def _signal(signal: MappedSignal, answers: Answers) -> list[str]:
     if signal.sign != 1.0:
         lines.append(f"sign = {signal.sign:g}")
     return lines
+
+
+def _key(name: str) -> str:
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _text(name)
 
 
 def _text(value: str) -> str:

@@ -31,7 +31,7 @@ def export(
     json: Path | None = None,
     progress: Callable[[str], None],
     ranges: TimeRanges = (),
-    tell: Callable[[str], None] = no_progress,
+    announce: Callable[[str], None] = no_progress,
 ) -> dict[str, Any]:
     """Export a model, or with `mcap` a log; return what was written (``ferryid.export/1``).
 
@@ -53,7 +53,7 @@ def export(
         Called with the name of each stage.
     ranges
         What of a log is exported; all of it where empty.
-    tell
+    announce
         Called with the vessel of a log where it was not asked for.
 
     Raises
@@ -89,7 +89,7 @@ def export(
     own = parse_profile(loaded.profile_text, loaded.name) if loaded else None
     choice = choose_vessel([what], vessel, own=own)
     if choice.reason:
-        tell(choice.reason)
+        announce(choice.reason)
     return export_log(
         what,
         mcap,

@@ -16,11 +16,12 @@ from ferryid.thresholds import BASES
 from tests.docs.pages import ROOT
 from tests.docs.thresholds import PAGE, page, stages
 
-PACKAGES = ("signals", "effects", "regression", "models", "identify", "compare", "diagnose")
+PACKAGES = ("signals", "draft", "effects", "regression", "models", "identify", "compare", "diagnose")
 """Packages that decide by thresholds."""
 NO_DECISION = {
     "constants of nature, of mathematics and of units": """
         signals.sampling GRAVITY
+        signals.time_ranges _DAY_S
         signals.kalman WINDOW_PER_TIME
         effects.payload WATER WATERPLANE
         diagnose.data.course NORMAL
@@ -73,6 +74,8 @@ NO_DECISION = {
         regression.resampling.paired_bootstrap NOTHING
     """,
     "rates, windows and orders of processing: how finely signals and forces are seen": """
+        draft.samples GRID_HZ SMOOTHED_S _SMOOTHED_PERIODS
+        draft.actuators _LAGS_S
         signals.align RATE_LIMIT_HZ
         signals.kalman _LONGEST_S
         signals.smooth _POLYNOMIAL
@@ -134,6 +137,8 @@ NO_DECISION = {
         signals.poses _STEPS_SAID
         signals.quality _MEDIAN_OF
         signals.render _FIELDS_SHOWN
+        draft.samples MOST_ROWS
+        draft.actuator_fields _MOST_SHARED
         diagnose.inference.folds DRAWS
         diagnose.inference.onset_estimation MOST_VALUES
         diagnose.inference.simulation_baseline SHOWN_ROWS

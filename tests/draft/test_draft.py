@@ -258,6 +258,25 @@ def test_a_propeller_with_a_rudder_is_asked_for_both(tmp_path: Path) -> None:
     assert profile.actuators[0].inflow["diameter_m"] == 1.5
 
 
+def test_actuators_that_share_a_topic(tmp_path: Path) -> None:
+    c = sailed(60.0)
+    folder = tmp_path / "log"
+    folder.mkdir()
+    nav = np.column_stack([c[name] for name in ("t", "N", "E", "psi", "u", "v", "r")])
+    orders = [
+        f"{t + 0.01 * k:.2f},10,{number},{value:.1f}\n"
+        for t, n, turn in zip(c["t"], c["n"], c["rudder"], strict=True)
+        for k, (number, value) in enumerate(((5, n - 100.0 * turn), (3, n + 100.0 * turn), (9, 7.0)))
+    ]
+    np.savetxt(folder / "nav.csv", nav, "%.6g", ",", header="t,N,E,psi,u,v,r", comments="")
+    (folder / "motors.csv").write_text("t,dev_id,msg_id,data\n" + "".join(orders), encoding="utf-8")
+    draft = draft_profile(folder)
+    assert [(one.name, one.kind) for one in draft.actuators] == [("msg3", "propeller"), ("msg5", "propeller")]
+    text = draft_text(draft, Answers("boat")).replace("# FILL IN: ", "")
+    signals = {signal.quantity: signal for signal in parse_profile(text, "boat.toml").signals}
+    assert signals["msg3.speed.command"].where == (("dev_id", 10.0), ("msg_id", 3.0))
+
+
 def test_an_answer_makes_an_order_of_a_signal(tmp_path: Path) -> None:
     draft, _ = drafted(tmp_path, {**in_ned(sailed()), "delta_rudder [rad]": sailed()["rudder"]})
     text = draft_text(draft, Answers("boat", {"propeller.order": "order"}))
