@@ -12,7 +12,7 @@ from ferryid.errors import did_you_mean
 if TYPE_CHECKING:
     from ferryid.vessel.folder_settings import FolderSettings
 
-_LOGS = ("logs", "log", "on", "versus")
+_LOGS = ("logs", "log", "on", "versus", "reference")
 """Parameters that are logs, in every command."""
 _PATHS = ("out", "recipe", "file", "mcap", "diagnosis", "json", "truth")
 """Options that are paths: those of a file begin at the file."""
