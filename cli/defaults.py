@@ -21,6 +21,9 @@ _PLACES = ("model", "against")
 _NOT_BY_FILE = ("help", "version", "vessel")
 """Options that are not set here; the vessel is found for each log."""
 
+_OTHER_MEANING = {"export": ("to",), "models": ("to",)}
+"""Options that mean something else in a command than in the others: what a file has for all is not theirs."""
+
 
 class DefaultsCommand(TyperCommand):
     """A command whose options take their defaults from the nearest ``ferryid.toml``."""
@@ -102,7 +105,7 @@ def _values(
                 (name,), f'there is no command "{name}".{did_you_mean(name, commands)} Fix: correct the name'
             )
     for name, value in settings.data.items():
-        if name in options:
+        if name in options and name not in _OTHER_MEANING.get(command, ()):
             yield (name,), name, value
         elif name not in tables and name != "vessel":
             every = {option for one in commands for option in _options_of(one)}

@@ -33,7 +33,7 @@ Vessel = Annotated[
     typer.Option(
         "--vessel",
         autocompletion=vessel_names,
-        help="Vessel profile: a name, or the path of a TOML file; found by the logs if left out (vessel.toml or ferryid.toml "
+        help="Vessel profile: a name, or the path of a TOML file; found from the logs if left out (vessel.toml or ferryid.toml "
         "beside them or above, $FERRYID_VESSEL, or the one profile that fits).",
     ),
 ]

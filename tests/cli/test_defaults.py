@@ -51,6 +51,13 @@ def test_the_command_line_counts_before_a_file(ferryid, log: Path, tmp_path: Pat
     assert not (log.parent / "results").exists()
 
 
+def test_an_end_of_ranges_is_no_version_and_no_form(ferryid, log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    put(log, "to = 60\n")
+    monkeypatch.chdir(log.parent)
+    assert "--to 60 is no" not in ferryid("models", "rollback", "boat", "--out", log.parent / "out").err
+    assert "give --to c|matlab" in ferryid("export", "boat", "--out", log.parent / "out").err
+
+
 def test_repeated_options_and_switches(ferryid, log: Path) -> None:
     put(log, '[diagnose]\nwithhold = ["wind", "wave"]\neach = true\n')
     run = ferryid("diagnose", log)
