@@ -61,7 +61,8 @@ _WORDS = "ferryid.words"
 
 def _logs_of(params: Mapping[str, Any]) -> list[str]:
     """Return the logs among the arguments of a command."""
-    logs = [params[name] for name in _LOGS if params.get(name)]
+    # A path of another type is a file to write, as that of simulate.
+    logs = [params[name] for name in _LOGS if params.get(name) and isinstance(params[name], str | list | tuple)]
     if params.get("mcap") is not None:
         logs.append(params["what"])
     words = params.get("words") or []

@@ -58,6 +58,13 @@ def test_an_end_of_ranges_is_no_version_and_no_form(ferryid, log: Path, monkeypa
     assert "give --to c|matlab" in ferryid("export", "boat", "--out", log.parent / "out").err
 
 
+def test_a_log_to_write_is_no_log_to_read(ferryid, log: Path, tmp_path: Path) -> None:
+    put(log, "sigmo = 1\n")
+    run = ferryid("simulate", "no-such-scenario", "--log", log.parent / "new.mcap")
+    assert run.code == 2
+    assert "no-such-scenario" in run.err
+
+
 def test_repeated_options_and_switches(ferryid, log: Path) -> None:
     put(log, '[diagnose]\nwithhold = ["wind", "wave"]\neach = true\n')
     run = ferryid("diagnose", log)
