@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import sqlite3
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from math import isfinite
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from mcap.writer import CompressionType
@@ -19,6 +22,8 @@ from rosbags.rosbag2.storage_mcap import McapWriter as McapStorage
 from rosbags.rosbag2.storage_sqlite3 import Sqlite3Writer as Sqlite3Storage
 
 from ferryid.errors import FerryIdError
+from ferryid.ingest.log import Series
+from ferryid.ingest.row_columns import path_steps
 from ferryid.simulate.messages import definition, serialised, typestore
 from ferryid.simulate.sensors import Stream
 
@@ -46,6 +51,50 @@ def write_mcap(streams: list[Stream], path: Path, chunk_bytes: int) -> None:
             writer.add_message(channels[index], when, data, publish_time=stamp, sequence=counts[index])
             counts[index] += 1
         writer.finish()  # type: ignore[no-untyped-call]
+
+
+def write_json_mcap(every: Sequence[Series], path: Path) -> None:
+    """Write series of fields as one MCAP file of JSON messages, whose paths, times and stamps are those of the series."""
+    with path.open("wb") as file:
+        writer = McapWriter(file, compression=CompressionType.ZSTD)
+        writer.start(profile="", library="")
+        schema = writer.register_schema("fields", "jsonschema", b'{"type": "object"}')
+        channels = [writer.register_channel(one.topic, "json", schema) for one in every]
+        receive = np.concatenate([one.receive_ns for one in every])
+        index = np.repeat(np.arange(len(every)), [len(one.receive_ns) for one in every])
+        messages = [_json_messages(one) for one in every]
+        for place in np.argsort(receive, kind="stable").tolist():
+            which, when = int(index[place]), int(receive[place])
+            writer.add_message(channels[which], when, next(messages[which]), publish_time=when)
+        writer.finish()  # type: ignore[no-untyped-call]
+
+
+def _json_messages(series: Series) -> Iterator[bytes]:
+    """Yield the messages of a series in the order in which a recorder gets them, what is not finite as null."""
+    paths = [(path, path_steps(path) or ()) for path in series.columns]
+    columns = {path: np.asarray(values).tolist() for path, values in series.columns.items()}
+    for row in np.argsort(series.receive_ns, kind="stable").tolist():
+        message: dict[str, Any] = {}
+        if series.stamp_ns is not None:
+            seconds, rest = divmod(int(series.stamp_ns[row]), 1_000_000_000)
+            message["header"] = {"stamp": {"sec": seconds, "nanosec": rest}}
+        for path, steps in paths:
+            value = columns[path][row]
+            _put(message, steps, None if isinstance(value, float) and not isfinite(value) else value)
+        yield json.dumps(message).encode()
+
+
+def _put(message: Any, steps: Sequence[str | int], value: Any) -> None:
+    """Put a value where a path leads, with whatever is needed around it."""
+    for step, inner in zip(steps, (*steps[1:], None), strict=True):
+        fresh: Any = value if inner is None else [] if isinstance(inner, int) else {}
+        if isinstance(step, int):
+            message += [None] * (step + 1 - len(message))
+            if inner is None or message[step] is None:
+                message[step] = fresh
+        elif inner is None or step not in message:
+            message[step] = fresh
+        message = message[step]
 
 
 def write_ros1(streams: list[Stream], path: Path, chunk_bytes: int) -> None:
