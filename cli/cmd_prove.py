@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ferryid.cli.options import OUT, Json, Out
+from ferryid.cli.options import OUT, Json, MaybeVessel, Out
 from ferryid.cli.output import emit, progress, tell
 
 
@@ -26,6 +26,13 @@ def command(
     dask: Annotated[
         str | None, typer.Option(help="Address of a Dask scheduler whose workers do the work; they must share --out.")
     ] = None,
+    real: Annotated[
+        str | None,
+        typer.Option(
+            help="Conceal the effects in real recordings: a TOML file that lists them, or a log, with --vessel its profile."
+        ),
+    ] = None,
+    vessel: MaybeVessel = None,
     check: Annotated[
         Path | None,
         typer.Option(help="Only check the answers.json of this folder against the commitment in its seal.json."),
@@ -33,7 +40,7 @@ def command(
     out: Out = OUT,
     json: Json = None,
 ) -> None:
-    """Inject effects into simulated trials, diagnose them without the answers, and score what is found."""
+    """Inject effects into simulated trials or real recordings, diagnose them without the answers, and score what is found."""
     if check is not None:
         from ferryid.validation.commitment import verified_answers
 
@@ -48,6 +55,8 @@ def command(
         seed=seed,
         runs=runs,
         only=cells,
+        real=real,
+        vessel=vessel,
         processes=processes,
         dask=dask,
         progress=progress,

@@ -707,20 +707,28 @@ def prove(
     seed: int | None = None,
     runs: float = 1.0,
     only: Sequence[str] = (),
+    real: str | None = None,
+    vessel: str | None = None,
     processes: int = 1,
     dask: str | None = None,
     progress: Progress = _quiet,
     announce: Progress = _quiet,
 ) -> Outcome:
-    """Inject effects into simulated trials, diagnose them blind and score what is found.
+    """Inject effects into simulated trials or real recordings, diagnose them blind and score what is found.
 
-    See `ferryid.validation.run.run_validation` for the arguments.
+    See `ferryid.validation.run.run_validation` for the arguments; `real` and `vessel` are those of
+    `ferryid.validation.recorded.evaluators.recorded_pipeline`.
     """
-    from ferryid.validation.evaluators import pipeline
+    from ferryid.errors import FerryIdError
+    from ferryid.validation import evaluators
+    from ferryid.validation.recorded.evaluators import recorded_pipeline
     from ferryid.validation.run import render_summary, run_validation
 
+    if real is None and vessel is not None:
+        raise FerryIdError("--vessel: the profile of a real recording, found no --real. Fix: give --real with its log")
+    pipeline = evaluators.pipeline() if real is None else recorded_pipeline(real, vessel)
     result = run_validation(
-        Path(out), pipeline(), seed=seed, runs=runs, only=only, processes=processes, dask=dask, progress=progress,
+        Path(out), pipeline, seed=seed, runs=runs, only=only, processes=processes, dask=dask, progress=progress,
         announce=announce,
     )  # fmt: skip
     return _outcome(result, render_summary(result))

@@ -117,8 +117,7 @@ def sample_cases(seed: int, runs: float, only: Sequence[str] = ()) -> list[Case]
     FerryIdError
         For a cell that there is not, and a number of runs that is none.
     """
-    if not 0.0 < runs < 1e3:
-        raise FerryIdError(f"--runs: {runs:g} is not a number of runs. Fix: give one above 0, such as 1")
+    check_runs(runs)
     every = cells()
     known = {cell.name for cell in every} | set(KINDS)
     for name in only:
@@ -133,12 +132,20 @@ def sample_cases(seed: int, runs: float, only: Sequence[str] = ()) -> list[Case]
         count = LEVELS * runs if cell.kind == "single" else TIMES.get(cell.kind, 1.0) * runs
         for number in range(max(1, round(count))):
             made.append(cell.draw(number, np.random.default_rng([seed, crc32(cell.name.encode()), number])))
-    order = np.random.default_rng([seed, 1]).permutation(len(made))
-    width = max(3, len(str(len(made))))
-    return [
-        replace(made[k], name=f"{place:0{width}d}", format=FORMATS[place % len(FORMATS)])
-        for place, k in enumerate(order.tolist())
-    ]
+    return [replace(case, format=FORMATS[place % len(FORMATS)]) for place, case in enumerate(numbered(made, seed))]
+
+
+def numbered(cases: Sequence[Case], seed: int) -> list[Case]:
+    """Return cases in random order, named by their place in it."""
+    order = np.random.default_rng([seed, 1]).permutation(len(cases))
+    width = max(3, len(str(len(cases))))
+    return [replace(cases[k], name=f"{place:0{width}d}") for place, k in enumerate(order.tolist())]
+
+
+def check_runs(runs: float) -> None:
+    """Refuse a number of runs that is none."""
+    if not 0.0 < runs < 1e3:
+        raise FerryIdError(f"--runs: {runs:g} is not a number of runs. Fix: give one above 0, such as 1")
 
 
 def _case(

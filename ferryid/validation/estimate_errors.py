@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import hypot, inf
-from typing import ClassVar
+from typing import ClassVar, Protocol
 
 import numpy as np
 
@@ -72,21 +72,41 @@ class EstimateErrors(Record):
         return Share(sum(error <= IN_TIME_S for error in self.times_s), len(self.times_s))
 
 
-def estimate_errors(results: Iterable[CaseResult]) -> tuple[EstimateErrors, ...]:
-    """Return the errors of what was named rightly: of everything first, then effect by effect."""
+class Parameters(Protocol):
+    """What is known of the parameters of an effect: the value that changes nothing, and which of them are places."""
+
+    @property
+    def neutral(self) -> float: ...
+    @property
+    def positions(self) -> tuple[str, ...]: ...
+
+
+def estimate_errors(
+    results: Iterable[CaseResult], effects: Mapping[str, Parameters] | None = None
+) -> tuple[EstimateErrors, ...]:
+    """Return the errors of what was named rightly: of everything first, then effect by effect.
+
+    Parameters
+    ----------
+    results
+        Of finished cases.
+    effects
+        Injected effects by their ids; those of the plant where None.
+    """
+    known = plant_effects() if effects is None else effects
     found: dict[str, list[EstimateErrors]] = {}
     for result in results:
         named = named_findings(result)
         for truth in result.truths:
             if truth.key in named:
                 values = result.realised.get(truth.effect, truth.values)
-                found.setdefault(truth.effect, []).append(_errors(truth, values, named[truth.key]))
+                found.setdefault(truth.effect, []).append(_errors(truth, known[truth.effect], values, named[truth.key]))
     every = [one for some in found.values() for one in some]
     return (_joined("all", every), *(_joined(effect, found[effect]) for effect in sorted(found)))
 
 
-def _errors(truth: Truth, values: Mapping[str, float], finding: Finding) -> EstimateErrors:
-    effect, estimates = plant_effects()[truth.effect], finding.parameters
+def _errors(truth: Truth, effect: Parameters, values: Mapping[str, float], finding: Finding) -> EstimateErrors:
+    estimates = finding.parameters
     errors, reaches = [], []
     for vector in parameter_vectors(list(values)):
         if not all(name in estimates for name in vector):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -19,6 +19,10 @@ class WrittenLog(Protocol):
     def log(self) -> Path: ...
     @property
     def profile(self) -> Path: ...
+    @property
+    def more(self) -> tuple[Path, ...]:
+        """Further logs, which are a campaign with the first."""
+        ...
 
 
 class Generate(Protocol):
@@ -81,6 +85,12 @@ class Pipeline:
         Makes of the scores which targets were reached: mappings of ``what``, ``reached``, ``sure`` and ``tested``.
     render
         Makes texts of the result and the scores, by the names of their files in the folder of the run; None makes none.
+    folder
+        Name of the run's folder in the output folder; its page has the same.
+    recordings
+        Options by which real recordings were given, ``real`` and ``vessel``; empty for simulated trials.
+    fingerprint
+        Hash by which these recordings are recognised.
     """
 
     draw: Callable[[int, float, Sequence[str]], Sequence[Case]]
@@ -90,3 +100,6 @@ class Pipeline:
     score: Callable[[Sequence[CaseResult]], Record]
     targets: Callable[[Any], Sequence[Record]]
     render: Callable[[Mapping[str, Any], Any], Mapping[str, str]] | None = None
+    folder: str = "proof"
+    recordings: Mapping[str, str] = field(default_factory=dict)
+    fingerprint: str = ""

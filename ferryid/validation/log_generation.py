@@ -19,10 +19,11 @@ TRANSFER_SEED = 0x5EED
 
 @dataclass(frozen=True)
 class LogFiles:
-    """The log and the profile of a case."""
+    """The log and the profile of a case, and the further logs of a campaign."""
 
     log: Path
     profile: Path
+    more: tuple[Path, ...] = ()
 
 
 def generate(case: Case, folder: Path, *, transfer: bool = False) -> LogFiles:

@@ -80,11 +80,11 @@ def run_validation(
     """
     seed = _checked_seed(seed)
     cases = pipeline.draw(seed, runs, only)
-    settings = {"runs": runs, "only": list(only)}
-    path = (out / "proof").resolve()
-    announce(f"seed {seed}; if interrupted, go on with: {_resume_command(seed, runs, only, out)}")
+    settings = {"runs": runs, "only": list(only), **pipeline.recordings}
+    path = (out / pipeline.folder).resolve()
+    announce(f"seed {seed}; if interrupted, go on with: {_resume_command(seed, runs, only, out, pipeline.recordings)}")
     with alone(path, wait=False), ExitStack() as last, spread(processes, dask) as workers:
-        folder = open_run_folder(path, seed, settings, announce)
+        folder = open_run_folder(path, seed, _request(settings, pipeline), announce)
         # Nothing half-done is left, however this ends: by then nobody works there any more.
         last.callback(remove_temporary, path)
         stage = partial(run_stage, workers=workers, progress=progress)
@@ -125,7 +125,7 @@ def run_validation(
             "commitment": committed,
             "guard": GUARD if diagnoses else "",
             "counts": {"cases": len(cases), **_counts(diagnoses.values())},
-            "folder": str(out / "proof"),
+            "folder": str(out / pipeline.folder),
             "settings": settings,
             "targets": [one.to_json() for one in pipeline.targets(scores)],
             "scores": scores.to_json(),
@@ -147,9 +147,15 @@ def _checked_seed(seed: int | None) -> int:
     return seed
 
 
-def _resume_command(seed: int, runs: float, only: Sequence[str], out: Path) -> str:
+def _request(settings: Mapping[str, Any], pipeline: Pipeline) -> dict[str, Any]:
+    """Return what decides which cases there are: the settings, and for real recordings their fingerprint."""
+    return {**settings, "fingerprint": pipeline.fingerprint} if pipeline.fingerprint else dict(settings)
+
+
+def _resume_command(seed: int, runs: float, only: Sequence[str], out: Path, recordings: Mapping[str, str]) -> str:
     cells = f" --only {quote(','.join(only))}" if only else ""
-    return f"ferryid prove --seed {seed} --runs {runs:g}{cells} --out {quote(str(out))}"
+    real = "".join(f" --{name} {quote(value)}" for name, value in recordings.items())
+    return f"ferryid prove{real} --seed {seed} --runs {runs:g}{cells} --out {quote(str(out))}"
 
 
 def _answers(
@@ -189,7 +195,7 @@ def _written_logs(stage: Any, folder: RunFolder, cases: Sequence[Case], pipeline
     work = {case.name: case for case in cases}
     written = stage("writing logs", lines, work, partial(write_case, pipeline.generate, logs))
     return {
-        name: LogJob(folder.path, folder.sources, name, files.log, files.profile)
+        name: LogJob(folder.path, folder.sources, name, files.log, files.profile, files.more)
         for name, files in _parsed(CaseFiles, lines, written).items()
     }
 
@@ -236,7 +242,7 @@ def render_summary(result: Mapping[str, Any]) -> str:
         f"{counts['crashed']} crashed",
         *(f"  {_outcome(one):<10}  {one['what']}" for one in result["targets"]),
         f"commitment: {result['commitment']}",
-        f"page:       {result['folder']}/proof.md",
+        f"page:       {result['folder']}/{Path(result['folder']).name}.md",
     ]
     return "\n".join(lines)
 

@@ -18,10 +18,12 @@ from ferryid.validation.commitment import ANSWERS_FILE, SEAL_FILE, commitment
 from ferryid.validation.source_hash import source_hash
 
 SALT_BYTES = 32
-RUN_FILE, RESULT_FILE, PAGE_FILE = "run.json", "result.json", "proof.md"
+RUN_FILE, RESULT_FILE = "run.json", "result.json"
+PAGES = ("proof", "proof-real")
+"""Names of folders of runs, of their pages and of the folders of their figures."""
 FILES = (
-    *(RUN_FILE, SEAL_FILE, ANSWERS_FILE, RESULT_FILE, PAGE_FILE),
-    *("lines", "logs", "models", "transfer", "scratch", "proof"),
+    *(RUN_FILE, SEAL_FILE, ANSWERS_FILE, RESULT_FILE, *(f"{name}.md" for name in PAGES)),
+    *("lines", "logs", "models", "transfer", "scratch", *PAGES),
 )
 """All that a run writes into its folder, and all that is removed where it begins from the start."""
 FORMER_FILE = "answers.sealed"

@@ -15,6 +15,8 @@ EVALUATION = (
         "validation/name_scores",
         "validation/oracle",
         "validation/page",
+        "validation/recorded/page",
+        "validation/recorded/scores",
         "validation/rivals/",
         "validation/scores",
         "validation/transfer",

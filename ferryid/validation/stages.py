@@ -29,6 +29,8 @@ class LogJob:
         Hash of the sources that it has to be diagnosed with.
     name, log, profile
         Of the case, and of the two files in its folder.
+    more
+        Further logs there, which are a campaign with the first.
     """
 
     run: Path
@@ -36,6 +38,7 @@ class LogJob:
     name: str
     log: str
     profile: str
+    more: tuple[str, ...] = ()
 
     @property
     def folder(self) -> Path:
@@ -50,10 +53,11 @@ class LogJob:
 
 @dataclass(frozen=True)
 class CaseFiles(Record):
-    """Names of the log and of its vessel's profile in the folder of a case."""
+    """Names of the log, of its vessel's profile and of further logs of a campaign in the folder of a case."""
 
     log: str
     profile: str
+    more: tuple[str, ...] = ()
 
 
 def write_case(generate: Generate, logs: Path, case: Case) -> dict[str, Any]:
@@ -61,10 +65,11 @@ def write_case(generate: Generate, logs: Path, case: Case) -> dict[str, Any]:
     with replacing(logs / case.name) as temporary:
         temporary.mkdir(parents=True)
         made = generate(case, temporary)
-        more = {path.name for path in temporary.iterdir()} - {made.log.name, made.profile.name}
-        if more:  # it may be an answer
-            raise ValueError(f"beside a log there may be its profile only, found {', '.join(sorted(more))}")
-    return CaseFiles(made.log.name, made.profile.name).to_json()
+        more = tuple(path.name for path in made.more)
+        other = {path.name for path in temporary.iterdir()} - {made.log.name, made.profile.name, *more}
+        if other:  # it may be an answer
+            raise ValueError(f"beside logs there may be their profile only, found {', '.join(sorted(other))}")
+    return CaseFiles(made.log.name, made.profile.name, more).to_json()
 
 
 def diagnose_case(job: LogJob) -> dict[str, Any]:
@@ -84,7 +89,8 @@ def diagnose_case(job: LogJob) -> dict[str, Any]:
     # A model of an earlier try, which was killed before its line was written, must not make this one the second.
     shutil.rmtree(job.out, ignore_errors=True)
     worker = worker_of(job.run)
-    diagnosis = worker.diagnose(path, job.folder / job.profile, job.out)
+    more = tuple(job.folder / name for name in job.more)
+    diagnosis = worker.diagnose(path, job.folder / job.profile, job.out, more)
     if worker.sources != job.sources:
         raise FerryIdError(
             f"prove: a worker has other sources of ferryid ({worker.sources}) than those of the commitment "

@@ -14,7 +14,7 @@ import sys
 import threading
 import time
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -30,8 +30,8 @@ RIVALS = 2
 KEPT = ("effect", "instance", "probability", "parameters", "improvement", "unresolved_with")
 
 
-def diagnose_log(log: Path, profile: Path, out: Path) -> Diagnosis:
-    """Return the diagnosis of one log; ``refused`` for one that cannot be used.
+def diagnose_log(log: Path, profile: Path, out: Path, more: Sequence[Path] = ()) -> Diagnosis:
+    """Return the diagnosis of one log, or of a campaign; ``refused`` for what cannot be used.
 
     Parameters
     ----------
@@ -39,6 +39,8 @@ def diagnose_log(log: Path, profile: Path, out: Path) -> Diagnosis:
         The log, and the TOML file of its vessel.
     out
         Folder for the model that comes of it.
+    more
+        Further logs, which are a campaign with the first: what most of its logs show is a finding.
 
     Raises
     ------
@@ -53,9 +55,10 @@ def diagnose_log(log: Path, profile: Path, out: Path) -> Diagnosis:
     try:
         vessel = load_profile(profile)
         run = RunContext(out, keep_tables=False)
-        (found,) = diagnose_and_store([str(log)], vessel, DiagnosisSettings(), run)
+        found = diagnose_and_store([str(log), *map(str, more)], vessel, DiagnosisSettings(), run)
         seconds = time.perf_counter() - start
-        made = to_json(found)
+        every = [to_json(one) for one in found]
+        made = every[0] if len(every) == 1 else _campaign(every)
     except UnwritableError:
         raise
     except FerryIdError as error:
@@ -70,6 +73,22 @@ def diagnose_log(log: Path, profile: Path, out: Path) -> Diagnosis:
     )
 
 
+def _campaign(every: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Return the diagnoses of a campaign as one: the findings that most logs have, each from the log of middle probability."""
+    found: dict[tuple[str, str | None], list[dict[str, Any]]] = {}
+    for one in every:
+        for finding in one["findings"]:
+            found.setdefault((finding["effect"], finding["instance"]), []).append(finding)
+    shared = [
+        sorted(some, key=lambda finding: finding["probability"])[len(some) // 2]
+        for some in found.values()
+        if 2 * len(some) > len(every)
+    ]
+    notes = list(dict.fromkeys(note for one in every for note in one["notes"]))
+    findings = sorted(shared, key=lambda finding: -finding["probability"])
+    return every[0] | {"findings": findings, "notes": notes, "before": {}, "after": {}}
+
+
 def _finding(one: Mapping[str, Any]) -> dict[str, Any]:
     where = one["where"]
     return {
@@ -80,7 +99,7 @@ def _finding(one: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def main(diagnose: Callable[[Path, Path, Path], Diagnosis] = diagnose_log) -> None:
+def main(diagnose: Callable[..., Diagnosis] = diagnose_log) -> None:
     """Answer requests until standard input ends.
 
     Parameters
@@ -100,7 +119,8 @@ def main(diagnose: Callable[[Path, Path, Path], Diagnosis] = diagnose_log) -> No
         log, profile, out = (Path(request[name]) for name in ("log", "profile", "out"))
         start = time.perf_counter()
         try:
-            answer = diagnose(log, profile, out).to_json()
+            more = [Path(path) for path in request["more"]]
+            answer = (diagnose(log, profile, out, more) if more else diagnose(log, profile, out)).to_json()
         except UnwritableError as error:
             answer = {UNWRITABLE: str(error)}
         except Exception as error:  # noqa: BLE001 - a bug that one log shows is reported in its line, and the others go on

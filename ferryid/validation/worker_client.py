@@ -54,8 +54,8 @@ class WorkerClient:
     ) -> None:
         self.close()
 
-    def diagnose(self, log: Path, profile: Path, out: Path) -> Diagnosis:
-        """Return the diagnosis of a log; ``crashed`` where the process died every time.
+    def diagnose(self, log: Path, profile: Path, out: Path, more: Sequence[Path] = ()) -> Diagnosis:
+        """Return the diagnosis of a log, or with more of them of a campaign; ``crashed`` where the process died every time.
 
         Raises
         ------
@@ -63,7 +63,12 @@ class WorkerClient:
             Where what comes of it could not be written.
         """
         out.mkdir(parents=True, exist_ok=True)
-        request = {"log": str(log.resolve()), "profile": str(profile.resolve()), "out": str(out.resolve())}
+        request = {
+            "log": str(log.resolve()),
+            "profile": str(profile.resolve()),
+            "out": str(out.resolve()),
+            "more": [str(path.resolve()) for path in more],
+        }
         start = time.perf_counter()
         for _ in range(TRIES):
             self._start()

@@ -28,6 +28,7 @@ TALLY = "FERRYID_TEST_TALLY"
 class Made:
     log: Path
     profile: Path
+    more: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -102,7 +102,9 @@ class RecordedLog:
     def motion_at(self, t: Floats) -> tuple[Floats, Floats]:
         """Return position with heading and velocities at other times [s], shape (len(t), 3) each."""
         measured = self.measurements
-        eta, nu = (np.column_stack([np.interp(t, measured.t, one) for one in rows.T]) for rows in (measured.eta, measured.nu))
+        eta, nu = (
+            np.column_stack([np.interp(t, measured.t, one) for one in rows.T]) for rows in (measured.eta, measured.nu)
+        )
         return eta, nu
 
     def changed(self, columns: Mapping[str, Floats]) -> RecordedLog:

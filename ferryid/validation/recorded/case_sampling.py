@@ -1,0 +1,212 @@
+"""Sampling of the cases that are made of real recordings: which effect, where, how large, from when on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from zlib import crc32
+
+import numpy as np
+
+from ferryid.counts import counted
+from ferryid.diagnose.data import window_lengths
+from ferryid.diagnose.inference import INFERENCE, windows
+from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.json_record import Record
+from ferryid.validation.case import Case, Truth
+from ferryid.validation.case_sampling import LEVELS, TURNS, check_runs, numbered
+from ferryid.validation.recorded.effects import Concealed, Concealment, concealments
+from ferryid.validation.recorded.log import RecordedLog, cached_log
+from ferryid.validation.recorded.manifest import Recording
+
+KINDS = ("clean", "single", "span")
+"""Kinds of cells: recordings as they are, one effect all along, and one that begins within the recording."""
+MOST_MISSED = 0.02
+"""Share of the rewritten rows that may lack what expresses an effect."""
+LATER = (0.3, 0.6)
+"""When an effect begins, as shares of the recording."""
+LARGE = (0.6, 0.95)
+"""How large it then is, as shares of the way from its smallest to its largest size by the logarithm."""
+
+
+@dataclass(frozen=True)
+class NotMade(Record):
+    """What cannot be concealed in a recording, and why.
+
+    Attributes
+    ----------
+    recording, effect
+        Name and effect id; the effect is empty for a recording that cannot be used.
+    size
+        Of the case, 0 where no size can be concealed.
+    why
+        As a sentence.
+    """
+
+    recording: str
+    effect: str
+    size: float
+    why: str
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """Cases, and those that cannot be made."""
+
+    cases: tuple[Case, ...]
+    not_made: tuple[NotMade, ...]
+
+
+def sample_recorded(recordings: Sequence[Recording], seed: int, runs: float, only: Sequence[str] = ()) -> Drawn:
+    """Return the cases of some recordings, in random order; each recording as it is is one of them.
+
+    Parameters
+    ----------
+    recordings
+        To conceal effects in.
+    seed
+        Of everything.
+    runs
+        Runs of each of five sizes of each effect in each recording; of an effect that begins within it, one for each.
+    only
+        Effects or kinds; every one if empty.
+
+    Raises
+    ------
+    FerryIdError
+        For an effect that there is not, a number of runs that is none, and where no recording can be used.
+    """
+    check_runs(runs)
+    known = [*concealments(), *KINDS]
+    for name in only:
+        if name not in known:
+            raise FerryIdError(
+                f"--only: no effect that can be concealed is called {name!r}.{did_you_mean(name, known)} "
+                f"Fix: give one of {', '.join(known)}"
+            )
+    cases, lacking = list[Case](), list[NotMade]()
+    for recording in recordings:
+        try:
+            logs = logs_of(recording)
+            check_length(recording, logs)
+        except FerryIdError as error:
+            lacking.append(NotMade(recording.name, "", 0.0, str(error)))
+            continue
+        cases.append(
+            _case(recording, logs, "unaltered", "clean", np.random.default_rng([seed, _key(recording, "clean")]))
+        )
+        for one in concealments().values():
+            made, not_made = _of_effect(recording, logs, one, seed, runs, only)
+            cases += made
+            lacking += not_made
+    if not cases:
+        raise FerryIdError(f"--real: no recording can be used. The first: {lacking[0].why}")
+    return Drawn(tuple(numbered(cases, seed)), tuple(lacking))
+
+
+def logs_of(recording: Recording) -> list[RecordedLog]:
+    """Return the logs of a recording, read once."""
+    return [cached_log(path, recording.vessel) for path in recording.logs]
+
+
+def check_length(recording: Recording, logs: Sequence[RecordedLog]) -> None:
+    """Refuse a recording that is too short for a diagnosis.
+
+    Raises
+    ------
+    FerryIdError
+        For a log by itself that has too few windows without a gap.
+    """
+    if len(logs) > 1:
+        return
+    measurements = logs[0].measurements
+    found = len(windows(measurements, *window_lengths(measurements.profile)).starts)
+    if found < INFERENCE.fewest_windows:
+        raise FerryIdError(
+            f"{recording.logs[0]}: too short for a diagnosis, found {logs[0].duration_s:.0f} s with "
+            f"{counted(found, 'stretch')} without a gap, and {INFERENCE.fewest_windows} are needed. "
+            "Fix: give a longer recording, or several as a campaign"
+        )
+
+
+def concealed(log: RecordedLog, truth: Truth, seed: int) -> Concealed:
+    """Return a recording in which an effect is concealed; the same for the same arguments."""
+    return concealments()[truth.effect].conceal(log, truth, np.random.default_rng([seed, 1]))
+
+
+def _of_effect(
+    recording: Recording,
+    logs: Sequence[RecordedLog],
+    one: Concealment,
+    seed: int,
+    runs: float,
+    only: Sequence[str],
+) -> tuple[list[Case], list[NotMade]]:
+    kinds = {"single": LEVELS * runs, "span": runs if one.time_limited and len(logs) == 1 else 0.0}
+    wanted = {kind: many for kind, many in kinds.items() if many and (not only or {kind, one.id} & set(only))}
+    if not wanted:
+        return [], []
+    why = next((reason for log in logs if (reason := one.cannot(log))), "")
+    if why:
+        return [], [NotMade(recording.name, one.id, 0.0, f"{one.id} cannot be concealed in {recording.name}: {why}.")]
+    cases, lacking = list[Case](), list[NotMade]()
+    for kind, many in wanted.items():
+        for number in range(max(1, round(many))):
+            rng = np.random.default_rng([seed, _key(recording, f"{one.id} {kind}"), number])
+            case = _drawn(recording, logs, one, kind, number, rng)
+            made = [concealed(log, case.truths[0], case.seed) for log in logs]
+            worst = max(made, key=lambda each: each.missed)
+            if worst.missed > MOST_MISSED:
+                text = f"{one.id} of {case.size:.3g} {one.unit} was not made in {recording.name}:"
+                text = f"{text} {100.0 * worst.missed:.0f} % of"
+                lacking.append(
+                    NotMade(recording.name, one.id, case.size, f"{text} the rows cannot express it, as {worst.why}.")
+                )
+            else:
+                cases.append(case)
+    return cases, lacking
+
+
+def _drawn(
+    recording: Recording,
+    logs: Sequence[RecordedLog],
+    one: Concealment,
+    kind: str,
+    number: int,
+    rng: np.random.Generator,
+) -> Case:
+    level = TURNS[number % LEVELS]
+    share = (level + rng.uniform()) / LEVELS if kind == "single" else rng.uniform(*LARGE)
+    begin = None if kind == "single" else float(rng.uniform(*LATER)) * logs[0].duration_s
+    least, most = one.sizes(logs[0])
+    size = float(least * (most / least) ** share)
+    truth = one.sample(size, logs[0], rng, (begin, None))
+    return _case(recording, logs, one.id, kind, rng, truth, level if kind == "single" else None, size)
+
+
+def _case(
+    recording: Recording,
+    logs: Sequence[RecordedLog],
+    effect: str,
+    kind: str,
+    rng: np.random.Generator,
+    truth: Truth | None = None,
+    level: int | None = None,
+    size: float = 0.0,
+) -> Case:
+    return Case(
+        "",
+        f"{effect}: {recording.name}",
+        kind,
+        logs[0].profile.name,
+        recording.name,
+        logs[0].kind,
+        seed=int(rng.integers(2**31)),
+        level=level,
+        size=size,
+        truths=() if truth is None else (truth,),
+    )
+
+
+def _key(recording: Recording, what: str) -> int:
+    return crc32(f"{recording.name} {what}".encode())

@@ -1,0 +1,146 @@
+"""The page of a proof on real recordings: what was concealed, what was found of it, and what this cannot show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from ferryid.counts import counted
+from ferryid.report.html import template
+from ferryid.report.validation_figures import Answers, Detected, detection_curves, parameter_errors
+from ferryid.types import Floats
+from ferryid.validation.detection_curves import Curve
+from ferryid.validation.estimate_errors import WITHIN, EstimateErrors
+from ferryid.validation.recorded.effects import ACTUATOR, LOAD, SENSOR, concealments
+from ferryid.validation.recorded.scores import DoseResponse, RecordedScores, recorded_targets
+
+BEYOND = 1.3
+"""How far the axis of a detection curve goes beyond the sizes tried, as a factor."""
+FAMILIES = {SENSOR: "Sensors", ACTUATOR: "Actuators", LOAD: "Loads"}
+
+
+def figures(scores: RecordedScores) -> dict[str, str]:
+    """Return the page's figures by file name, as SVG text."""
+    drawn = {}
+    shown = [one for one in scores.responses if one.curve is not None and one.noticed_curve is not None]
+    if shown:
+        drawn["detection.svg"] = detection_curves([_detected(one) for one in shown])
+    found = {one.effect: one.errors for one in scores.recoveries[1:] if one.errors}
+    if found:
+        drawn["errors.svg"] = parameter_errors(found, WITHIN)
+    return drawn
+
+
+def page(result: Mapping[str, Any], scores: RecordedScores) -> str:
+    """Return the page as Markdown; figures lie in the folder ``proof-real`` beside it.
+
+    Parameters
+    ----------
+    result
+        Seed, commitment, counts and settings of the run.
+    scores
+        Of its cases.
+    """
+    known, every = concealments(), scores.recoveries[0]
+    tried = {one.effect for one in scores.responses}
+    context = {
+        "result": result,
+        "scores": scores,
+        "cases": counted(scores.runs, "case"),
+        "seconds": [f"{one:.0f}" for one in scores.seconds],
+        "lost": [f"{result['counts'][name]} {name}" for name in ("refused", "crashed") if result["counts"][name]],
+        "targets": recorded_targets(scores),
+        "families": [
+            (title, [(one.id, one.how) for one in known.values() if one.family == family and one.id in tried])
+            for family, title in FAMILIES.items()
+        ],
+        "unaltered": [
+            (
+                one.recording,
+                one.vessel,
+                one.verdict.replace("_", " "),
+                f"{one.seconds:.0f}",
+                _list(one.named),
+                _list(one.hinted),
+            )
+            for one in scores.unaltered
+        ],
+        "responses": [_row(one) for one in scores.responses],
+        "wrong": _counts(scores.wrong_names),
+        "gone": _counts(scores.gone_names),
+        "every": every,
+        "median_error": _percent(every.median_error),
+        "errors": [_errors(one) for one in scores.recoveries[1:]],
+        "not_made": _not_made(scores),
+        "figures": figures(scores),
+    }
+    return template("validation_recorded.md").render(context)
+
+
+def _row(one: DoseResponse) -> tuple[str, ...]:
+    unit = concealments()[one.effect].unit
+    if one.curve is None or one.noticed_curve is None:
+        return one.effect, one.recording, unit, "", "", "", "the recording as it was has this name"
+    note = ", ".join(f"{count} {what}" for what, count in one.instead.items())
+    named = f"{sum(one.named)} of {len(one.named)}"
+    return one.effect, one.recording, unit, named, one.curve.text, one.noticed_curve.text, note
+
+
+def _detected(one: DoseResponse) -> Detected:
+    assert one.curve is not None
+    assert one.noticed_curve is not None
+    limits = (min(one.sizes) / BEYOND, max(one.sizes) * BEYOND)
+    title = f"{one.effect}\n{one.recording}"
+    return Detected(
+        title,
+        concealments()[one.effect].unit,
+        limits,
+        _answers(one.sizes, one.named, one.curve),
+        _answers(one.sizes, one.noticed, one.noticed_curve),
+    )
+
+
+def _answers(sizes: tuple[float, ...], named: tuple[bool, ...], fitted: Curve) -> Answers:
+    x: Floats = np.geomspace(fitted.least, fitted.most, 120)
+    return Answers(np.asarray(sizes), np.asarray(named, dtype=bool), x, fitted.share(x))
+
+
+def _errors(one: EstimateErrors) -> tuple[Any, ...]:
+    times = f"{one.in_time.count}/{one.in_time.of}" if one.in_time.of else ""
+    covered = f"{one.covered.count}/{one.covered.of}" if one.covered.of else ""
+    within = f"{one.within.count}/{one.within.of}" if one.within.of else ""
+    return one.effect, one.found, _percent(one.median_error), within, covered, times
+
+
+def _not_made(scores: RecordedScores) -> list[str]:
+    """Return one line for each recording and reason, with the sizes together."""
+    sizes: dict[tuple[str, str, str], list[float]] = {}
+    for one in scores.not_made:
+        reason = one.why.rpartition(" rows cannot express it, ")[2] if one.size else one.why
+        sizes.setdefault((one.recording, one.effect, reason), []).append(one.size)
+    lines = []
+    for (recording, effect, reason), some in sizes.items():
+        if some[0]:
+            least, most, unit = min(some), max(some), concealments()[effect].unit
+            lines.append(
+                f"{effect} of {least:.3g} to {most:.3g} {unit} ({counted(len(some), 'case')}) was not made in {recording}: "
+                f"more than 2 % of the rows cannot express it, {reason}"
+            )
+        else:
+            lines.append(reason)
+    return lines
+
+
+def _list(names: tuple[str, ...]) -> str:
+    return ", ".join(names) or "none"
+
+
+def _counts(names: Mapping[str, int]) -> str:
+    return ", ".join(f"{count} {name}" for name, count in names.items())
+
+
+def _percent(value: float) -> str:
+    return f"{100.0 * value:.1f} %" if isfinite(value) else "none"

@@ -1,0 +1,242 @@
+"""Figures of merit of a proof on real recordings: what a concealed effect changes in the diagnosis."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ferryid.json_record import Record
+from ferryid.validation.case import Case
+from ferryid.validation.detection_curves import Curve, curve
+from ferryid.validation.estimate_errors import EstimateErrors, estimate_errors
+from ferryid.validation.name_scores import HULL, Share, names, outcome_of_missed, wrong_names
+from ferryid.validation.recorded.case_sampling import NotMade
+from ferryid.validation.recorded.effects import concealments
+from ferryid.validation.records import UNKNOWN, CaseResult, Diagnosis, Key
+from ferryid.validation.targets import COVERED, FALSE, IN_TIME, Target, share_target
+
+MEDIAN_ERROR = 0.05
+"""Median relative error of parameters that is allowed."""
+
+
+@dataclass(frozen=True)
+class Unaltered(Record):
+    """A recording as it was.
+
+    Attributes
+    ----------
+    recording, vessel
+        Names.
+    verdict, seconds
+        Of its diagnosis.
+    named, hinted
+        Effects with their thrusters.
+    """
+
+    recording: str
+    vessel: str
+    verdict: str
+    seconds: float
+    named: tuple[str, ...]
+    hinted: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class DoseResponse(Record):
+    """How large an effect has to be in a recording to be named.
+
+    Attributes
+    ----------
+    effect, recording
+        Of the cases.
+    present
+        True where the recording as it was has that name already: such cases enter no other figure.
+    sizes, named, noticed
+        Of every case: its size, whether it was named, and whether it was named or a hint that the recording had not before.
+    curve, noticed_curve
+        Detection curves of both; None where there is no case.
+    instead
+        What became of those that were not named, and how often.
+    """
+
+    effect: str
+    recording: str
+    present: bool
+    sizes: tuple[float, ...]
+    named: tuple[bool, ...]
+    noticed: tuple[bool, ...]
+    curve: Curve | None
+    noticed_curve: Curve | None
+    instead: Mapping[str, int]
+
+
+@dataclass(frozen=True)
+class RecordedScores(Record):
+    """All figures of merit.
+
+    Attributes
+    ----------
+    runs
+        Cases, the recordings as they were among them.
+    unaltered
+        What the diagnosis makes of each recording as it was.
+    responses
+        By effect and recording.
+    right
+        Share of cases whose effect is named.
+    wrong, wrong_names
+        Share of cases with a name that is neither concealed in them nor in the recording as it was, and how often each.
+    gone, gone_names
+        Share of cases without a name that the recording as it was has, and how often each.
+    recoveries
+        Errors of what was named rightly, of everything first, then by effect.
+    not_made
+        What could not be concealed.
+    seconds
+        Of the median diagnosis, and of the slowest.
+    """
+
+    runs: int
+    unaltered: tuple[Unaltered, ...]
+    responses: tuple[DoseResponse, ...]
+    right: Share
+    wrong: Share
+    wrong_names: Mapping[str, int]
+    gone: Share
+    gone_names: Mapping[str, int]
+    recoveries: tuple[EstimateErrors, ...]
+    not_made: tuple[NotMade, ...]
+    seconds: tuple[float, float]
+
+
+def score_recorded(results: Sequence[CaseResult], not_made: Sequence[NotMade]) -> RecordedScores:
+    """Return the figures of merit of finished cases, each beside its recording as it was.
+
+    Parameters
+    ----------
+    results
+        Of all cases.
+    not_made
+        What could not be concealed.
+    """
+    plain = {one.case.path: one for one in results if one.case.kind == "clean"}
+    altered = [one for one in results if one.case.truths]
+    fresh = [one for one in altered if not _present(one, plain[one.case.path])]
+    differences = [difference(one, plain[one.case.path]) for one in fresh]
+    wrong = [wrong_names(one) for one in differences]
+    gone = [_gone(one, plain[one.case.path]) for one in fresh]
+    seconds = [one.diagnosis.seconds for one in results]
+    return RecordedScores(
+        len(results),
+        tuple(_unaltered(one) for one in plain.values()),
+        _responses(altered, plain),
+        Share(sum(one.truths[0].key in names(one) for one in differences), len(differences)),
+        Share(sum(map(bool, wrong)), len(wrong)),
+        Counter(label(key) for keys in wrong for key in keys),
+        Share(sum(map(bool, gone)), len(gone)),
+        Counter(label(key) for keys in gone for key in keys),
+        estimate_errors(differences, concealments()),
+        tuple(not_made),
+        (float(np.median(seconds)), max(seconds)) if seconds else (0.0, 0.0),
+    )
+
+
+def difference(result: CaseResult, plain: CaseResult) -> CaseResult:
+    """Return a case without the findings that the recording as it was has; a hint there does not excuse a name here."""
+    known = set(names(plain))
+    kept = tuple(one for one in result.diagnosis.findings if one.key not in known or one.key == result.truths[0].key)
+    case = replace(result.case, allowed=(*result.case.allowed, HULL))
+    return replace(result, case=case, diagnosis=replace(result.diagnosis, findings=kept))
+
+
+def label(key: Key) -> str:
+    """Return an effect with its thruster in one word or two."""
+    return key[0] if key[1] is None else f"{key[0]} ({key[1]})"
+
+
+def recorded_targets(scores: RecordedScores) -> list[Target]:
+    """Return every target."""
+    every = scores.recoveries[0]
+    small = f"median relative error of parameters: at most {100.0 * MEDIAN_ERROR:.0f} %"
+    error = every.median_error
+    return [
+        share_target(
+            f"cases with a name that is neither concealed nor in the recording: at most {100.0 * FALSE:.0f} %",
+            scores.wrong,
+            at_most=FALSE,
+        ),
+        share_target(
+            f"cases without a name of the recording: at most {100.0 * FALSE:.0f} %", scores.gone, at_most=FALSE
+        ),
+        share_target(
+            "95 % intervals that hold the truth: 93 to 97 %", every.covered, at_least=COVERED[0], at_most=COVERED[1]
+        ),
+        Target(f"{small}; {100.0 * error:.1f} %", error <= MEDIAN_ERROR, True)
+        if every.errors
+        else Target(small, None, False, tested=False),
+        share_target("onsets within 5 s: at least 90 %", every.in_time, at_least=IN_TIME),
+    ]
+
+
+def _present(result: CaseResult, plain: CaseResult) -> bool:
+    return result.truths[0].key in names(plain)
+
+
+def _gone(result: CaseResult, plain: CaseResult) -> list[Key]:
+    return [key for key in names(plain) if key not in names(result) and key[0] not in (UNKNOWN, HULL)]
+
+
+def _unaltered(result: CaseResult) -> Unaltered:
+    diagnosis, case = result.diagnosis, result.case
+    hinted = tuple(label(one.key) for one in diagnosis.findings if one.hint and one.effect != UNKNOWN)
+    verdict = diagnosis.error or diagnosis.verdict
+    named = tuple(label(key) for key in names(result))
+    return Unaltered(case.path, case.vessel, verdict, diagnosis.seconds, named, hinted)
+
+
+def _responses(results: Sequence[CaseResult], plain: Mapping[str, CaseResult]) -> tuple[DoseResponse, ...]:
+    sorted_by: dict[tuple[str, str], list[CaseResult]] = {}
+    for result in results:
+        if result.case.kind == "single":
+            sorted_by.setdefault((_effect(result.case), result.case.path), []).append(result)
+    places = {name: place for place, name in enumerate(concealments())}
+    keys = sorted(sorted_by, key=lambda key: (places[key[0]], key[1]))
+    return tuple(_response(*key, sorted_by[key], plain[key[1]]) for key in keys)
+
+
+def _response(effect: str, recording: str, results: Sequence[CaseResult], plain: CaseResult) -> DoseResponse:
+    fresh = [one for one in results if not _present(one, plain)]
+    sizes = tuple(one.case.size for one in fresh)
+    named = tuple(one.truths[0].key in names(one) for one in fresh)
+    before = _found(plain.diagnosis)
+    noticed = tuple(
+        name or bool({one.truths[0].key} & _found(one.diagnosis) - before)
+        for name, one in zip(named, fresh, strict=True)
+    )
+    lost = Counter(
+        outcome_of_missed(difference(one, plain), one.truths[0].key)
+        for name, one in zip(named, fresh, strict=True)
+        if not name
+    )
+    return DoseResponse(
+        effect,
+        recording,
+        not fresh,
+        sizes,
+        named,
+        noticed,
+        curve(sizes, named) if fresh else None,
+        curve(sizes, noticed) if fresh else None,
+        dict(lost.most_common()),
+    )
+
+
+def _found(diagnosis: Diagnosis) -> set[Key]:
+    return {one.key for one in diagnosis.findings}
+
+
+def _effect(case: Case) -> str:
+    return case.truths[0].effect
