@@ -96,7 +96,7 @@ def sample_recorded(recordings: Sequence[Recording], seed: int, runs: float, onl
             _case(recording, logs, "unaltered", "clean", np.random.default_rng([seed, _key(recording, "clean")]))
         )
         for one in concealments().values():
-            made, not_made = _of_effect(recording, logs, one, seed, runs, only)
+            made, not_made = _of_effect(recording, logs, one, seed, runs * recording.runs, only)
             cases += made
             lacking += not_made
     if not cases:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from itertools import pairwise
@@ -19,7 +19,7 @@ from ferryid.types import Floats, Nanoseconds
 from ferryid.validation.recorded.signal_values import with_columns
 from ferryid.vessel import actuator_columns
 from ferryid.vessel.profile import Profile
-from ferryid.vessel.signal_map import convert, select
+from ferryid.vessel.signal_map import canonical_columns, convert, select
 
 MESSAGES, FOLDER, TABLE = "messages", "folder", "table"
 """How a log is kept: messages of topics, a folder of CSV files, one table."""
@@ -106,6 +106,15 @@ class RecordedLog:
             np.column_stack([np.interp(t, measured.t, one) for one in rows.T]) for rows in (measured.eta, measured.nu)
         )
         return eta, nu
+
+    def fields(self, topic: str, columns: Collection[str]) -> set[str]:
+        """Return the raw fields of a topic that canonical columns are made of."""
+        return {
+            path
+            for signal in self.profile.signals
+            if signal.topic.strip("/") == topic.strip("/") and set(canonical_columns(signal)) & set(columns)
+            for path in signal.fields
+        }
 
     def changed(self, columns: Mapping[str, Floats]) -> RecordedLog:
         """Return it with other values in canonical columns, shape of their topics' rows."""

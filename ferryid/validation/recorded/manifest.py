@@ -13,8 +13,9 @@ from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.validation.recorded.log import name_of_log
 
 SCHEMA = "ferryid.recordings/1"
-KEYS = ("name", "log", "campaign", "vessel")
+KEYS = ("name", "log", "campaign", "vessel", "runs")
 LARGEST_BYTES = 1 << 20
+MOST_RUNS = 1e3
 
 
 @dataclass(frozen=True)
@@ -29,11 +30,14 @@ class Recording:
         Paths; parts of one recording joined by ``+``.
     vessel
         Name of a bundled profile, or path of a TOML file.
+    runs
+        Factor on the number of runs: fewer for a recording whose diagnosis takes long.
     """
 
     name: str
     logs: tuple[str, ...]
     vessel: str
+    runs: float = 1.0
 
 
 def load_recordings(real: str, vessel: str | None) -> tuple[Recording, ...]:
@@ -72,7 +76,7 @@ def fingerprint(recordings: Sequence[Recording]) -> str:
     """Return a hash of names, vessels, and names and sizes of files: what tells one set of recordings from another."""
     digest = sha256()
     for one in recordings:
-        digest.update(repr((one.name, one.vessel)).encode())
+        digest.update(repr((one.name, one.vessel, one.runs)).encode())
         for log in one.logs:
             for part in [log] if Path(log).exists() else log.split("+"):
                 root = Path(part)
@@ -122,10 +126,15 @@ def _entry(path: Path, number: int, entry: Mapping[str, Any]) -> Recording:
     name = entry.get("name", Path(name_of_log(logs[0])).stem)
     if not isinstance(name, str) or not name:
         raise FerryIdError(f'{where}: "name" is text, found {name!r}. Fix: write it in quotes')
+    runs = entry.get("runs", 1.0)
+    if isinstance(runs, bool) or not isinstance(runs, int | float) or not 0.0 < runs < MOST_RUNS:
+        raise FerryIdError(
+            f"{where}: runs is a factor above 0, found {runs!r}. Fix: give one such as 0.4, or leave it out"
+        )
     beside = path.parent
     placed = ["+".join(str(beside / part) for part in log.split("+")) for log in logs]
     profile = str(beside / vessel) if vessel.endswith(".toml") else vessel
-    return Recording(name, tuple(placed), profile)
+    return Recording(name, tuple(placed), profile, float(runs))
 
 
 def _texts(value: Any) -> bool:

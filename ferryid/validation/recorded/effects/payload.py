@@ -42,7 +42,7 @@ CONCEALMENT = Concealment(
     "payload",
     LOAD,
     "share of the mass",
-    "Actuators claim less by what a mass takes to follow the measured motion.",
+    "Actuators claim besides what a mass takes to follow the measured motion.",
     lambda log: (0.01, 0.6),
     sample,
     conceal,
