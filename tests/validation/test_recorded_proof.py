@@ -1,0 +1,151 @@
+"""A proof on real recordings as a whole: committed, written, diagnosed, resumed, and scored as a difference."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ferryid.errors import FerryIdError
+from ferryid.validation import stages
+from ferryid.validation.case import Case, Truth
+from ferryid.validation.commitment import verified_answers
+from ferryid.validation.recorded.case_sampling import NotMade
+from ferryid.validation.recorded.evaluators import recorded_pipeline
+from ferryid.validation.recorded.log import read_log
+from ferryid.validation.recorded.page import page
+from ferryid.validation.recorded.scores import recorded_targets, score_recorded
+from ferryid.validation.records import CaseResult, Diagnosis, Finding
+from ferryid.validation.run import render_summary, run_validation
+from ferryid.validation.source_hash import source_hash
+from ferryid.vessel import load_profile
+from tests.cli.test_every_command import conforms
+from tests.validation.recorded_logs import zigzag
+from tests.validation.test_scores import finding
+
+LEAST_M = 0.3
+
+
+class Surveyor:
+    """A diagnosis that looks at nothing but the place of the antenna, against the log as it was."""
+
+    sources = source_hash()
+
+    def __init__(self, original: Path) -> None:
+        self.eta = read_log(str(original), load_profile("kvlcc2-model")).measurements.eta
+        self.seen: list[str] = []
+
+    def diagnose(self, log: Path, profile: Path, out: Path, more: Sequence[Path] = ()) -> Diagnosis:
+        self.seen.append(log.name)
+        assert sorted(path.name for path in log.parent.iterdir()) == sorted([log.name, "vessel.toml"])
+        eta = read_log(str(log), load_profile(profile)).measurements.eta
+        c, s = np.cos(eta[:, 2]), np.sin(eta[:, 2])
+        north, east = (eta - self.eta)[:, :2].T
+        x, y = float(np.mean(c * north + s * east)), float(np.mean(c * east - s * north))
+        found = (finding("lever_arm", {"x": x, "y": y}),) if np.hypot(x, y) > LEAST_M else ()
+        return Diagnosis("explained", 1.0, found)
+
+
+def validated(out: Path, log: Path, **options: Any) -> dict[str, Any]:
+    options = {"seed": 7, "only": ["lever_arm"], "processes": 1, **options}
+    pipeline = recorded_pipeline(str(log), "kvlcc2-model")
+    return run_validation(out, pipeline, progress=lambda stage: None, announce=lambda line: None, **options)
+
+
+@pytest.mark.slow
+def test_from_the_recording_to_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    log, out = zigzag(tmp_path / "zigzag.dat", 170.0), tmp_path / "out"
+    surveyor = Surveyor(log)
+    monkeypatch.setattr(stages, "worker_of", lambda run: surveyor)
+    result = validated(out, log)
+    conforms(json.dumps(result))
+    assert result["settings"] == {"runs": 1.0, "only": ["lever_arm"], "real": str(log), "vessel": "kvlcc2-model"}
+    assert result["counts"] == {"cases": 6, "diagnosed": 6, "refused": 0, "crashed": 0}
+    (response,) = result["scores"]["responses"]
+    assert response["named"] == [size > LEAST_M for size in response["sizes"]]
+    assert 0 < sum(response["named"]) < 5
+    every = result["scores"]["recoveries"][0]
+    assert every["found"] == sum(response["named"])
+    assert every["median_error"] < 1e-3
+    folder = out / "proof-real"
+    text = (folder / "proof-real.md").read_text("utf-8")
+    assert "| lever_arm | zigzag | m |" in text
+    assert "(proof-real/detection.svg)" in text
+    assert (folder / "proof-real" / "detection.svg").exists()
+    assert f"{folder}/proof-real.md" in render_summary(result)
+    assert len(verified_answers(folder)["cases"]) == 6
+    # Killed after four diagnoses, it goes on with the other two.
+    lines = folder / "lines" / "diagnosed.jsonl"
+    lines.write_text("".join(lines.read_text("utf-8").splitlines(keepends=True)[:4]), encoding="utf-8")
+    surveyor.seen.clear()
+    assert validated(out, log)["scores"]["responses"] == result["scores"]["responses"]
+    assert len(surveyor.seen) == 2
+    # Other recordings are another run.
+    (folder / "result.json").unlink()
+    with pytest.raises(FerryIdError, match="unfinished run of another seed"):
+        validated(out, zigzag(tmp_path / "zigzag.dat", 171.0))
+
+
+ARM = Truth("lever_arm", None, {"x": 1.0, "y": 0.0})
+
+
+def case(truths: tuple[Truth, ...], findings: list[Finding], size: float = 1.0, **more: Any) -> CaseResult:
+    made = Case("1", "lever_arm: a", "single", "boat", "a", "table", 1, 2, size, truths)
+    return CaseResult(replace(made, **more), {}, Diagnosis("explained", 2.0, tuple(findings)))
+
+
+def plain(findings: list[Finding]) -> CaseResult:
+    return case((), findings, kind="clean", cell="unaltered: a", level=None)
+
+
+def test_what_counts_is_the_difference() -> None:
+    arm = finding("lever_arm", {"x": 1.1, "y": 0.0}, 0.2)
+    own, hint = finding("time_delay", {"seconds": 0.2}), finding("mooring", p=0.4)
+    results = [
+        plain([own, hint]),
+        case((ARM,), [arm, own]),
+        case((ARM,), [arm, own, finding("payload")]),
+        case((ARM,), [finding("lever_arm", p=0.5), own], size=0.5),
+        case((ARM,), [arm, finding("mooring")]),
+        case((ARM,), [], size=0.1),
+    ]
+    scores = score_recorded(results, [NotMade("a", "wind", 0.0, "wind cannot be concealed in a: no areas.")])
+    assert scores.runs == 6
+    assert scores.unaltered[0].named == ("time_delay",)
+    assert scores.unaltered[0].hinted == ("mooring",)
+    assert (scores.right.count, scores.right.of) == (3, 5)
+    # The recording's own delay is not wrong, a hint of it does not excuse a name, and a name of it that is missing is gone.
+    assert (scores.wrong.count, scores.wrong_names) == (2, {"payload": 1, "mooring": 1})
+    assert (scores.gone.count, scores.gone_names) == (2, {"time_delay": 2})
+    (response,) = scores.responses
+    assert response.named == (True, True, False, True, False)
+    assert response.noticed == (True, True, True, True, False)
+    assert response.instead == {"a hint": 1, "none": 1}
+    assert scores.recoveries[0].errors == pytest.approx([0.1, 0.1, 0.1])
+    assert scores.recoveries[0].covered.value == 1.0
+    (errors,) = [one for one in recorded_targets(scores) if one.what.startswith("median")]
+    assert errors.reached is False
+    result = {
+        "settings": {"real": "list.toml", "runs": 1.0, "only": []},
+        "seed": 7,
+        "counts": {"refused": 0, "crashed": 0, "diagnosed": 6},
+        "commitment": "0" * 64,
+    }
+    text = page(result, scores)
+    assert "| a | boat | explained | 2 | time_delay | mooring |" in text
+    assert "- wind cannot be concealed in a: no areas." in text
+    assert "2 time_delay" in text
+
+
+def test_what_the_recording_has_already_is_left_out() -> None:
+    arm = finding("lever_arm", {"x": 1.0, "y": 0.0})
+    scores = score_recorded([plain([arm]), case((ARM,), [arm])], [])
+    assert scores.right.of == 0
+    (response,) = scores.responses
+    assert response.present
+    assert response.curve is None
