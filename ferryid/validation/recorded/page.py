@@ -15,7 +15,7 @@ from ferryid.types import Floats
 from ferryid.validation.detection_curves import Curve
 from ferryid.validation.estimate_errors import WITHIN, EstimateErrors
 from ferryid.validation.recorded.effects import ACTUATOR, LOAD, SENSOR, concealments
-from ferryid.validation.recorded.scores import DoseResponse, RecordedScores, recorded_targets
+from ferryid.validation.recorded.scores import DoseResponse, Later, RecordedScores, recorded_targets
 
 BEYOND = 1.3
 """How far the axis of a detection curve goes beyond the sizes tried, as a factor."""
@@ -69,11 +69,13 @@ def page(result: Mapping[str, Any], scores: RecordedScores) -> str:
             for one in scores.unaltered
         ],
         "responses": [_row(one) for one in scores.responses],
+        "later": [_later(one) for one in scores.later],
         "wrong": _counts(scores.wrong_names),
         "gone": _counts(scores.gone_names),
         "every": every,
         "median_error": _percent(every.median_error),
         "errors": [_errors(one) for one in scores.recoveries[1:]],
+        "noticed_errors": [_errors(one) for one in scores.noticed_recoveries[1:]],
         "not_made": _not_made(scores),
         "figures": figures(scores),
     }
@@ -87,6 +89,13 @@ def _row(one: DoseResponse) -> tuple[str, ...]:
     note = ", ".join(f"{count} {what}" for what, count in one.instead.items())
     named = f"{sum(one.named)} of {len(one.named)}"
     return one.effect, one.recording, unit, named, one.curve.text, one.noticed_curve.text, note
+
+
+def _later(one: Later) -> tuple[str, ...]:
+    outcome = "named" if one.named else "a hint" if one.noticed else "no"
+    found = "none" if one.found_s is None else f"{one.found_s:.0f}"
+    size = f"{one.size:.2g} {concealments()[one.effect].unit}"
+    return one.effect, one.recording, size, f"{one.onset_s:.0f}", outcome, found
 
 
 def _detected(one: DoseResponse) -> Detected:

@@ -15,7 +15,7 @@ from ferryid.validation.estimate_errors import EstimateErrors, estimate_errors
 from ferryid.validation.name_scores import HULL, Share, names, outcome_of_missed, wrong_names
 from ferryid.validation.recorded.case_sampling import NotMade
 from ferryid.validation.recorded.effects import concealments
-from ferryid.validation.records import UNKNOWN, CaseResult, Diagnosis, Key
+from ferryid.validation.records import UNKNOWN, CaseResult, Key
 from ferryid.validation.targets import COVERED, FALSE, IN_TIME, Target, share_target
 
 MEDIAN_ERROR = 0.05
@@ -74,6 +74,31 @@ class DoseResponse(Record):
 
 
 @dataclass(frozen=True)
+class Later(Record):
+    """An effect that began within a recording.
+
+    Attributes
+    ----------
+    effect, recording, size
+        Of the case.
+    onset_s
+        When it began [s].
+    named, noticed
+        As in `DoseResponse`.
+    found_s
+        The onset that was found [s]; None where none was.
+    """
+
+    effect: str
+    recording: str
+    size: float
+    onset_s: float
+    named: bool
+    noticed: bool
+    found_s: float | None
+
+
+@dataclass(frozen=True)
 class RecordedScores(Record):
     """All figures of merit.
 
@@ -84,15 +109,17 @@ class RecordedScores(Record):
     unaltered
         What the diagnosis makes of each recording as it was.
     responses
-        By effect and recording.
+        By effect and recording, of effects that act all along.
+    later
+        Of effects that began within a recording.
     right
         Share of cases whose effect is named.
     wrong, wrong_names
         Share of cases with a name that is neither concealed in them nor in the recording as it was, and how often each.
     gone, gone_names
         Share of cases without a name that the recording as it was has, and how often each.
-    recoveries
-        Errors of what was named rightly, of everything first, then by effect.
+    recoveries, noticed_recoveries
+        Errors of what was named rightly, and of what was named or a new hint: of everything first, then by effect.
     not_made
         What could not be concealed.
     seconds
@@ -102,12 +129,14 @@ class RecordedScores(Record):
     runs: int
     unaltered: tuple[Unaltered, ...]
     responses: tuple[DoseResponse, ...]
+    later: tuple[Later, ...]
     right: Share
     wrong: Share
     wrong_names: Mapping[str, int]
     gone: Share
     gone_names: Mapping[str, int]
     recoveries: tuple[EstimateErrors, ...]
+    noticed_recoveries: tuple[EstimateErrors, ...]
     not_made: tuple[NotMade, ...]
     seconds: tuple[float, float]
 
@@ -133,12 +162,14 @@ def score_recorded(results: Sequence[CaseResult], not_made: Sequence[NotMade]) -
         len(results),
         tuple(_unaltered(one) for one in plain.values()),
         _responses(altered, plain),
+        tuple(_later(one, plain[one.case.path]) for one in fresh if one.case.kind == "span"),
         Share(sum(one.truths[0].key in names(one) for one in differences), len(differences)),
         Share(sum(map(bool, wrong)), len(wrong)),
         Counter(label(key) for keys in wrong for key in keys),
         Share(sum(map(bool, gone)), len(gone)),
         Counter(label(key) for keys in gone for key in keys),
         estimate_errors(differences, concealments()),
+        estimate_errors([_sure(one, plain[one.case.path]) for one in differences], concealments()),
         tuple(not_made),
         (float(np.median(seconds)), max(seconds)) if seconds else (0.0, 0.0),
     )
@@ -211,11 +242,7 @@ def _response(effect: str, recording: str, results: Sequence[CaseResult], plain:
     fresh = [one for one in results if not _present(one, plain)]
     sizes = tuple(one.case.size for one in fresh)
     named = tuple(one.truths[0].key in names(one) for one in fresh)
-    before = _found(plain.diagnosis)
-    noticed = tuple(
-        name or bool({one.truths[0].key} & _found(one.diagnosis) - before)
-        for name, one in zip(named, fresh, strict=True)
-    )
+    noticed = tuple(_noticed(one, plain) for one in fresh)
     lost = Counter(
         outcome_of_missed(difference(one, plain), one.truths[0].key)
         for name, one in zip(named, fresh, strict=True)
@@ -234,8 +261,29 @@ def _response(effect: str, recording: str, results: Sequence[CaseResult], plain:
     )
 
 
-def _found(diagnosis: Diagnosis) -> set[Key]:
-    return {one.key for one in diagnosis.findings}
+def _noticed(result: CaseResult, plain: CaseResult) -> bool:
+    """Return whether an effect is named, or a hint that the recording as it was does not have."""
+    key = result.truths[0].key
+    found, before = ({one.key for one in each.diagnosis.findings} for each in (result, plain))
+    return key in names(result) or key in found - before
+
+
+def _sure(result: CaseResult, plain: CaseResult) -> CaseResult:
+    """Return a case in which a new hint of its effect counts as its name."""
+    if not _noticed(result, plain):
+        return result
+    key = result.truths[0].key
+    findings = tuple(replace(one, probability=1.0) if one.key == key else one for one in result.diagnosis.findings)
+    return replace(result, diagnosis=replace(result.diagnosis, findings=findings))
+
+
+def _later(result: CaseResult, plain: CaseResult) -> Later:
+    truth = result.truths[0]
+    assert truth.onset_s is not None
+    noticed = _noticed(result, plain)
+    found = next((one.onset for one in result.diagnosis.findings if one.key == truth.key), None) if noticed else None
+    named = truth.key in names(result)
+    return Later(truth.effect, result.case.path, result.case.size, truth.onset_s, named, noticed, found)
 
 
 def _effect(case: Case) -> str:
