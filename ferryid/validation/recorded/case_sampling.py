@@ -14,13 +14,15 @@ from ferryid.diagnose.inference import INFERENCE, windows
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.json_record import Record
 from ferryid.validation.case import Case, Truth
-from ferryid.validation.case_sampling import LEVELS, TURNS, check_runs, numbered
+from ferryid.validation.case_sampling import LEVELS, check_runs, numbered
 from ferryid.validation.recorded.effects import Concealed, Concealment, concealments
 from ferryid.validation.recorded.log import RecordedLog, cached_log
 from ferryid.validation.recorded.manifest import Recording
 
 KINDS = ("clean", "single", "span")
 """Kinds of cells: recordings as they are, one effect all along, and one that begins within the recording."""
+TURNS = (3, 1, 4, 2, 0)
+"""Sizes in the order of the runs: a single run is one that a user would want to know of."""
 MOST_MISSED = 0.02
 """Share of the rewritten rows that may lack what expresses an effect."""
 LATER = (0.3, 0.6)
