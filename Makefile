@@ -7,7 +7,7 @@ VENV ?= .venv
 BIN = $(VENV)/bin
 DEMO ?= ferryid-out
 
-.PHONY: quick test docs evidence size demo picture bench attack faults real campaign rivals thesis proof wavy fixtures wheel-check lint clean
+.PHONY: quick test docs evidence size demo picture bench attack faults real campaign rivals thesis proof proof-real wavy fixtures wheel-check lint clean
 
 # On two cores: a worker takes a slow test at a time and the rest by files, so that the fixtures of a file are made once.
 SPREAD = -n 2 --dist loadgroup --no-loadscope-reorder
@@ -88,6 +88,15 @@ proof: $(VENV)/installed
 	  $(DEMO)/proof/lines/diagnosed.jsonl reports/proof/
 	cp $(DEMO)/proof.json reports/proof.json
 	$(BIN)/python -m tests.evidence reports/proof.md
+
+# Conceals effects in real recordings, where they are present, and diagnoses them blind: writes reports/proof-real.md and its
+# figures. SEED=N and RUNS=N as for the proof. It goes on where it was interrupted.
+proof-real: $(VENV)/installed
+	$(BIN)/ferryid prove --real tests/real/recordings.toml --seed $(SEED) --runs $(RUNS) --processes 1 --out $(DEMO)
+	mkdir -p reports/proof-real && cp $(DEMO)/proof-real/proof-real.md reports/
+	cp $(DEMO)/proof-real/proof-real/*.svg $(DEMO)/proof-real/answers.json $(DEMO)/proof-real/seal.json \
+	  $(DEMO)/proof-real/lines/diagnosed.jsonl reports/proof-real/
+	$(BIN)/python -m tests.evidence reports/proof-real.md
 
 # Learns a hull in waves that nobody measured, and uses it in calm water: writes reports/waves.md.
 wavy: $(VENV)/installed

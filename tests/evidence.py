@@ -24,6 +24,7 @@ MAKERS: Mapping[str, tuple[str, ...]] = {
     "reports/campaign.md": ("tests/real",),
     "reports/demo/forces.svg": ("cli/cmd_simulate.py", "cli/cmd_fit.py"),
     "reports/proof.md": ("cli/cmd_prove.py",),
+    "reports/proof-real.md": ("cli/cmd_prove.py",),
     "reports/real.md": ("tests/real",),
     "reports/real/diagnosis.md": ("tests/real",),
     "reports/rivals.md": ("tests/rivals",),
