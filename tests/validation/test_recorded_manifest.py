@@ -25,11 +25,12 @@ def listed(folder: Path, text: str) -> Path:
 
 
 def test_paths_lead_from_the_list(tmp_path: Path) -> None:
-    text = f'{HEAD}{ENTRY}name = "first"\n[[recording]]\ncampaign = ["b.bag", "c.bag+d.bag"]\nvessel = "own.toml"\nruns = 0.5\n'
+    text = f'{HEAD}{ENTRY}name = "first"\n[[recording]]\ncampaign = ["b.bag", "c.bag+d.bag"]\nvessel = "own.toml"\nruns = 0.5\nonly = ["wind"]\n'
     first, second = load_recordings(str(listed(tmp_path, text)), None)
     assert first == Recording("first", (str(tmp_path / "a.csv"),), "milliampere", 1.0)
     assert second.logs == (str(tmp_path / "b.bag"), f"{tmp_path / 'c.bag'}+{tmp_path / 'd.bag'}")
     assert (second.name, second.vessel, second.runs) == ("b", str(tmp_path / "own.toml"), 0.5)
+    assert second.only == ("wind",)
     assert fingerprint([first]) != fingerprint([second])
     before = fingerprint([first])
     (tmp_path / "a.csv").write_text("t,x\n")
@@ -53,6 +54,11 @@ def test_a_log_is_a_list_of_one(tmp_path: Path) -> None:
         (HEAD + '[[recording]]\nlog = "a"\n', "needs vessel, found None"),
         (HEAD + ENTRY + "name = 3\n", '"name" is text'),
         (HEAD + ENTRY + "runs = 0\n", "runs is a factor above 0, found 0"),
+        (HEAD + ENTRY + "only = 3\n", "only is a list of effects, found 3"),
+        (
+            HEAD + ENTRY + 'only = ["winds"]\n',
+            'only names "winds", which is no effect that can be concealed. Did you mean "wind"',
+        ),
         (HEAD + ENTRY + ENTRY, 'two recordings are called "a"'),
         ("schema = ", "cannot be read as a list of recordings"),
     ],
@@ -114,18 +120,22 @@ def test_what_cannot_be_used_is_a_line_and_the_others_go_on(places: dict[str, st
 
 @pytest.mark.slow
 def test_cases_of_a_seed_are_the_same_and_each_recording_is_one(places: dict[str, str]) -> None:
-    every = (Recording("long", (places["long"],), "kvlcc2-model"),)
+    every = (
+        Recording("long", (places["long"],), "kvlcc2-model"),
+        Recording("again", (places["long"],), "kvlcc2-model", only=("heading_bias",)),
+    )
     drawn = sample_recorded(every, 3, 1.0, ["thruster_gain", "lever_arm"])
     assert drawn == sample_recorded(every, 3, 1.0, ["thruster_gain", "lever_arm"])
     assert drawn != sample_recorded(every, 4, 1.0, ["thruster_gain", "lever_arm"])
     kinds = sorted((one.kind, one.cell) for one in drawn.cases)
     assert kinds == [
+        ("clean", "unaltered: again"),
         ("clean", "unaltered: long"),
         *[("single", "lever_arm: long")] * 5,
         *[("single", "thruster_gain: long")] * 5,
         ("span", "thruster_gain: long"),
     ]
-    assert [one.name for one in drawn.cases] == [f"{number:03d}" for number in range(12)]
+    assert [one.name for one in drawn.cases] == [f"{number:03d}" for number in range(13)]
     least, most = concealments()["lever_arm"].sizes(tanker())
     sizes = sorted(one.size for one in drawn.cases if one.cell.startswith("lever_arm"))
     assert [int(5.0 * _share(size, least, most)) for size in sizes] == [0, 1, 2, 3, 4]

@@ -146,7 +146,7 @@ def _of_effect(
 ) -> tuple[list[Case], list[NotMade]]:
     kinds = {"single": LEVELS * runs, "span": runs if one.time_limited and len(logs) == 1 else 0.0}
     wanted = {kind: many for kind, many in kinds.items() if many and (not only or {kind, one.id} & set(only))}
-    if not wanted:
+    if not wanted or (recording.only and one.id not in recording.only):
         return [], []
     why = next((reason for log in logs if (reason := one.cannot(log))), "")
     if why:

@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.validation.recorded.effects import concealments
 from ferryid.validation.recorded.log import name_of_log
 
 SCHEMA = "ferryid.recordings/1"
-KEYS = ("name", "log", "campaign", "vessel", "runs")
+KEYS = ("name", "log", "campaign", "vessel", "runs", "only")
 LARGEST_BYTES = 1 << 20
 MOST_RUNS = 1e3
 
@@ -32,12 +33,15 @@ class Recording:
         Name of a bundled profile, or path of a TOML file.
     runs
         Factor on the number of runs: fewer for a recording whose diagnosis takes long.
+    only
+        Effects that are concealed in it; every one if empty.
     """
 
     name: str
     logs: tuple[str, ...]
     vessel: str
     runs: float = 1.0
+    only: tuple[str, ...] = ()
 
 
 def load_recordings(real: str, vessel: str | None) -> tuple[Recording, ...]:
@@ -76,7 +80,7 @@ def fingerprint(recordings: Sequence[Recording]) -> str:
     """Return a hash of names, vessels, and names and sizes of files: what tells one set of recordings from another."""
     digest = sha256()
     for one in recordings:
-        digest.update(repr((one.name, one.vessel, one.runs)).encode())
+        digest.update(repr((one.name, one.vessel, one.runs, one.only)).encode())
         for log in one.logs:
             for part in [log] if Path(log).exists() else log.split("+"):
                 root = Path(part)
@@ -131,10 +135,19 @@ def _entry(path: Path, number: int, entry: Mapping[str, Any]) -> Recording:
         raise FerryIdError(
             f"{where}: runs is a factor above 0, found {runs!r}. Fix: give one such as 0.4, or leave it out"
         )
+    only = entry.get("only", [])
+    if not _texts(only) and only != []:
+        raise FerryIdError(f"{where}: only is a list of effects, found {only!r}. Fix: name effects, or leave it out")
+    for effect in only:
+        if effect not in concealments():
+            raise FerryIdError(
+                f'{where}: only names "{effect}", which is no effect that can be concealed.'
+                f"{did_you_mean(effect, concealments())} Fix: give some of {', '.join(concealments())}"
+            )
     beside = path.parent
     placed = ["+".join(str(beside / part) for part in log.split("+")) for log in logs]
     profile = str(beside / vessel) if vessel.endswith(".toml") else vessel
-    return Recording(name, tuple(placed), profile, float(runs))
+    return Recording(name, tuple(placed), profile, float(runs), tuple(only))
 
 
 def _texts(value: Any) -> bool:
