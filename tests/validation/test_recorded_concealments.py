@@ -12,6 +12,7 @@ import pytest
 from ferryid.effects import effects
 from ferryid.effects.force_model import Measurements, hull_of, required_force
 from ferryid.effects.measurements import hull_force_model
+from ferryid.simulate.sensors import quaternion
 from ferryid.types import Floats
 from ferryid.validation.case import Truth
 from ferryid.validation.plant.effects.payload import BOARDING_S
@@ -21,7 +22,8 @@ from ferryid.validation.recorded.effects import SENSOR, Concealment, concealment
 from ferryid.validation.recorded.effects.thruster_interaction import left_by
 from ferryid.validation.recorded.hull import wind_load
 from ferryid.validation.recorded.log import RecordedLog
-from tests.validation.recorded_logs import KINDS, ferry, tanker, written
+from ferryid.validation.recorded.signal_values import with_columns
+from tests.validation.recorded_logs import KINDS, ferry, folder, tanker, written
 
 pytestmark = pytest.mark.slow
 
@@ -37,9 +39,9 @@ def altered(
     return made.log
 
 
-def reread(log: RecordedLog, folder: Path) -> Measurements:
+def reread(log: RecordedLog, place: Path) -> Measurements:
     """Return what a changed recording measures once it was written."""
-    return written(log, folder).measurements
+    return written(log, place).measurements
 
 
 def same(before: Measurements, after: Measurements, *names: str) -> bool:
@@ -78,6 +80,24 @@ def test_a_heading_that_is_off(kind: str, tmp_path: Path) -> None:
     b = radians(5.0) if kind == "table" else 0.0
     assert np.allclose(after.nu_raw[:, 0], cos(b) * u + sin(b) * v)
     assert np.allclose(after.nu_raw[:, 1], cos(b) * v - sin(b) * u)
+
+
+def test_a_heading_turns_and_the_tilt_stays() -> None:
+    log = ferry()
+    series = log.series[log.topics["psi"]]
+    n = len(series.receive_ns)
+    names = [f"pose.pose.orientation.{axis}" for axis in "xyzw"]
+    tilted = quaternion(np.full(n, 0.1), np.full(n, -0.2), np.full(n, 1.0))
+    series = replace(series, columns=series.columns | dict(zip(names, tilted, strict=True)))
+    made = with_columns(log.profile, series, {"psi": np.full(n, 1.5)})
+    wanted = quaternion(np.full(n, 0.1), np.full(n, -0.2), np.full(n, 1.5))
+    for name, values in zip(names, wanted, strict=True):
+        assert np.allclose(made.columns[name], values), name
+
+
+def test_times_are_written_to_the_nanosecond() -> None:
+    for topic, series in folder().series.items():
+        assert np.array_equal(series.receive_ns, ferry().series[topic].receive_ns), topic
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -200,6 +220,8 @@ def test_a_race_takes_the_plants_share() -> None:
     assert left_by(0.4, fore, aft, one, zero, 1.0) == pytest.approx(0.6)
     assert left_by(0.4, fore, aft, -one, zero, 1.0) == pytest.approx(1.0)
     assert left_by(0.4, fore, aft, 0.04 * one, zero, 1.0) == pytest.approx(0.8)
+    # Ten degrees beside it: 0.6 + 0.4 * 1000 / (130 / 0.6³ + 1000).
+    assert left_by(0.4, fore, aft, one, radians(10.0) * one, 1.0) == pytest.approx(0.8497, abs=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -226,13 +248,19 @@ def test_the_librarys_effect_takes_back_what_a_load_adds(
     assert size((claimed - needed)[inside]) < left * size(needed[inside])
 
 
-def test_a_load_that_comes_aboard_takes_momentum() -> None:
+def test_a_load_that_comes_aboard_takes_momentum(tmp_path: Path) -> None:
     log = ferry()
     values = {"mass": 300.0, "x": 0.0}
     before = conceal_load(log, np.zeros_like(log.measurements.nu)).log
     for drive in drives(log).values():
         assert np.allclose(before.columns[drive.column], log.columns[drive.column], atol=1e-6)
     made = altered(log, "payload", values, onset_s=20.0)
+    always, later = (reread(one, tmp_path).parts.sum(axis=1) for one in (altered(log, "payload", values), made))
+    acted, row = log.measurements.parts.sum(axis=1), int(np.searchsorted(log.measurements.t, 20.0))
+    # Half of it is aboard, and its momentum comes at a sixth a second.
+    momentum = values["mass"] * log.measurements.nu[row, :2] / BOARDING_S
+    assert np.allclose((later - acted)[row, :2], 0.5 * (always - acted)[row, :2] + momentum, atol=2.0)
+    assert np.abs(momentum).max() > 10.0
     t = log.times(log.topics[next(iter(drives(log).values())).column])
     column = next(iter(drives(log).values())).column
     # The slope of what is aboard reaches a row further.

@@ -25,7 +25,8 @@ def listed(folder: Path, text: str) -> Path:
 
 
 def test_paths_lead_from_the_list(tmp_path: Path) -> None:
-    text = f'{HEAD}{ENTRY}name = "first"\n[[recording]]\ncampaign = ["b.bag", "c.bag+d.bag"]\nvessel = "own.toml"\nruns = 0.5\nonly = ["wind"]\n'
+    campaign = 'campaign = ["b.bag", "c.bag+d.bag"]\nvessel = "own.toml"\nruns = 0.5\nonly = ["wind"]\n'
+    text = f'{HEAD}{ENTRY}name = "first"\n[[recording]]\n{campaign}'
     first, second = load_recordings(str(listed(tmp_path, text)), None)
     assert first == Recording("first", (str(tmp_path / "a.csv"),), "milliampere", 1.0)
     assert second.logs == (str(tmp_path / "b.bag"), f"{tmp_path / 'c.bag'}+{tmp_path / 'd.bag'}")

@@ -142,6 +142,23 @@ def test_what_counts_is_the_difference() -> None:
     assert "2 time_delay" in text
 
 
+def test_a_hint_that_the_recording_has_already_is_not_noticed() -> None:
+    hint = finding("lever_arm", p=0.4)
+    scores = score_recorded([plain([hint]), case((ARM,), [hint])], [])
+    assert scores.responses[0].noticed == (False,)
+    assert scores.noticed_recoveries[0].found == 0
+
+
+def test_an_effect_that_began_within_a_recording() -> None:
+    weak = Truth("thruster_gain", "port", {"factor": 0.8}, 100.0)
+    hint = finding("thruster_gain", {"factor": 0.82}, 0.05, "port", p=0.5, onset=103.0)
+    scores = score_recorded([plain([]), case((weak,), [hint], kind="span", level=None)], [])
+    assert scores.responses == ()
+    (later,) = scores.later
+    assert (later.onset_s, later.named, later.noticed, later.found_s) == (100.0, False, True, 103.0)
+    assert scores.noticed_recoveries[0].in_time.value == 1.0
+
+
 def test_what_the_recording_has_already_is_left_out() -> None:
     arm = finding("lever_arm", {"x": 1.0, "y": 0.0})
     scores = score_recorded([plain([arm]), case((ARM,), [arm])], [])
