@@ -91,6 +91,8 @@ class Pipeline:
         Options by which real recordings were given, ``real`` and ``vessel``; empty for simulated trials.
     fingerprint
         Hash by which these recordings are recognised.
+    remarks
+        Returns, after the draw, lines on what could not be drawn.
     """
 
     draw: Callable[[int, float, Sequence[str]], Sequence[Case]]
@@ -103,3 +105,4 @@ class Pipeline:
     folder: str = "proof"
     recordings: Mapping[str, str] = field(default_factory=dict)
     fingerprint: str = ""
+    remarks: Callable[[], Sequence[str]] = lambda: ()

@@ -82,6 +82,8 @@ def run_validation(
     cases = pipeline.draw(seed, runs, only)
     settings = {"runs": runs, "only": list(only), **pipeline.recordings}
     path = (out / pipeline.folder).resolve()
+    for line in pipeline.remarks():
+        announce(line)
     announce(f"seed {seed}; if interrupted, go on with: {_resume_command(seed, runs, only, out, pipeline.recordings)}")
     with alone(path, wait=False), ExitStack() as last, spread(processes, dask) as workers:
         folder = open_run_folder(path, seed, _request(settings, pipeline), announce)

@@ -20,7 +20,8 @@ from ferryid.validation.recorded.allocation import conceal_load
 from ferryid.validation.recorded.drives import drives
 from ferryid.validation.recorded.effects import SENSOR, Concealment, concealments
 from ferryid.validation.recorded.effects.thruster_interaction import left_by
-from ferryid.validation.recorded.hull import wind_load
+from ferryid.validation.recorded.effects.waves import series
+from ferryid.validation.recorded.hull import current_load, damping, wind_load
 from ferryid.validation.recorded.log import RecordedLog
 from ferryid.validation.recorded.signal_values import with_columns
 from tests.validation.recorded_logs import KINDS, ferry, folder, tanker, written
@@ -96,8 +97,8 @@ def test_a_heading_turns_and_the_tilt_stays() -> None:
 
 
 def test_times_are_written_to_the_nanosecond() -> None:
-    for topic, series in folder().series.items():
-        assert np.array_equal(series.receive_ns, ferry().series[topic].receive_ns), topic
+    for topic, one in folder().series.items():
+        assert np.array_equal(one.receive_ns, ferry().series[topic].receive_ns), topic
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -230,6 +231,9 @@ def test_a_race_takes_the_plants_share() -> None:
         ("payload", {"mass": 300.0, "x": 0.5}, 0.02),
         # The plant's line stiffens by less than a hundredth within the few metres that the ferry is from its end.
         ("mooring", {"stiffness_north": 10.0, "stiffness_east": 5.0, "north": 3.0, "east": -4.0}, 0.03),
+        # Strips and friction lines in the place of polynomials: alike, and no more.
+        ("current", {"north": 0.3, "east": -0.2}, 0.5),
+        ("fouling", {"surge": 2.0, "sway": 1.5, "yaw": 1.5}, 0.5),
     ],
 )
 def test_the_librarys_effect_takes_back_what_a_load_adds(
@@ -278,6 +282,44 @@ def test_wind_on_the_bow_by_hand() -> None:
     # Pressure on the wall that faces it and suction behind: Hoerner's 0.75 and 0.35.
     wanted = -0.5 * 1.225 * 25.0 * areas.frontal_m2 * (0.75 + 0.35 * tanh(3.0))
     assert np.allclose(load, [wanted, 0.0, 0.0], atol=1e-6 * abs(wanted))
+
+
+def test_a_vessel_that_drifts_with_the_water_feels_none() -> None:
+    log = ferry()
+    n = len(log.measurements.t)
+    drifting = replace(
+        log.measurements,
+        nu=np.tile([0.3, -0.2, 0.0], (n, 1)),
+        eta=np.zeros((n, 3)),
+        parts=np.zeros_like(log.measurements.parts),
+    )
+    adrift = replace(log, measurements=drifting)
+    # Of the Munk moment in still water, u v (A22 - A11), nothing is left either.
+    M = log.profile.hull.M
+    munk = [0.0, 0.0, 0.3 * -0.2 * (M[1, 1] - M[0, 0])]
+    assert np.allclose(current_load(adrift, np.array([0.3, -0.2])), munk - damping(adrift, drifting.nu))
+
+
+def test_roughness_is_a_factor_on_what_is_quadratic() -> None:
+    log = ferry()
+    nu = log.measurements.nu
+    plain, none, double = (damping(log, nu, np.full(3, factor)) for factor in (1.0, 0.0, 2.0))
+    assert np.allclose(double - plain, plain - none)
+    assert np.allclose(plain, damping(log, nu))
+    assert size(plain - none) > 0.1 * size(plain)
+
+
+def test_waves_are_a_narrow_band() -> None:
+    t = np.arange(0.0, 2000.0, 0.1)
+    made = series(t, 0.4, np.random.default_rng(4))
+    power, f = np.abs(np.fft.rfft(made)) ** 2, np.fft.rfftfreq(len(t), 0.1)
+    assert made.std() == pytest.approx(1.0)
+    assert float((power * f).sum() / power.sum()) == pytest.approx(0.4, abs=0.02)
+    assert power[(f > 0.24) & (f < 0.56)].sum() > 0.99 * power.sum()
+    log = ferry()
+    force = log.measurements.parts.sum(axis=1)[:, :2]
+    truth = concealments()["waves"].sample(0.5, log, np.random.default_rng(), (None, None))
+    assert truth.values["force_std"] == pytest.approx(0.5 * np.sqrt(np.mean(force**2)))
 
 
 def test_a_load_is_shared_by_least_norm(tmp_path: Path) -> None:

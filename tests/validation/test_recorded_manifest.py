@@ -115,6 +115,8 @@ def test_what_cannot_be_used_is_a_line_and_the_others_go_on(places: dict[str, st
     assert (
         lacking["payload"] == "payload cannot be concealed in pause: its actuators cannot push freely in sway and yaw."
     )
+    with pytest.raises(FerryIdError, match=r"none of these effects can be concealed.*cannot push freely"):
+        sample_recorded(every[:1], 3, 0.2, ["payload"])
     with pytest.raises(FerryIdError, match=r"no recording can be used\. The first: .*too short"):
         sample_recorded(every[1:2], 3, 0.2)
 

@@ -103,6 +103,11 @@ def sample_recorded(recordings: Sequence[Recording], seed: int, runs: float, onl
             lacking += not_made
     if not cases:
         raise FerryIdError(f"--real: no recording can be used. The first: {lacking[0].why}")
+    if not any(case.truths for case in cases):
+        raise FerryIdError(
+            f"--real: none of these effects can be concealed in the recordings. The first: {lacking[0].why} "
+            "Fix: leave out --only, or give other recordings"
+        )
     return Drawn(tuple(numbered(cases, seed)), tuple(lacking))
 
 

@@ -48,6 +48,7 @@ def recorded_pipeline(real: str, vessel: str | None) -> Pipeline:
         FOLDER,
         given,
         fingerprint(recordings),
+        proof.remarks,
     )
 
 
@@ -95,6 +96,9 @@ class _Proof:
         drawn = sample_recorded(self.recordings, seed, runs, only)
         self.not_made = drawn.not_made
         return drawn.cases
+
+    def remarks(self) -> list[str]:
+        return [one.why for one in self.not_made]
 
     def score(self, results: Sequence[CaseResult]) -> Any:
         from ferryid.validation.recorded.scores import score_recorded
