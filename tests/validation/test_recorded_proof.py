@@ -24,9 +24,12 @@ from ferryid.validation.records import CaseResult, Diagnosis, Finding
 from ferryid.validation.run import render_summary, run_validation
 from ferryid.validation.source_hash import source_hash
 from ferryid.vessel import load_profile
+from tests.cli.conftest import ferryid as ferryid_fixture
 from tests.cli.test_every_command import conforms
-from tests.validation.recorded_logs import zigzag
+from tests.validation.recorded_logs import BAG, zigzag
 from tests.validation.test_scores import finding
+
+ferryid_run = ferryid_fixture
 
 LEAST_M = 0.3
 
@@ -166,3 +169,32 @@ def test_what_the_recording_has_already_is_left_out() -> None:
     (response,) = scores.responses
     assert response.present
     assert response.curve is None
+    # One metre of its own and one concealed are two, of which one is found.
+    assert [(one.parameter, one.expected, one.found) for one in scores.moved] == [("x", 2.0, 1.0), ("y", 0.0, 0.0)]
+
+
+def test_factors_of_an_effect_and_of_the_recording_multiply() -> None:
+    weak = Truth("velocity_scale", None, {"factor": 0.8})
+    own, after = (finding("velocity_scale", {"factor": value}, p=0.4) for value in (0.9, 0.73))
+    scores = score_recorded([plain([own]), case((weak,), [after])], [])
+    assert [(one.before, one.expected, one.found) for one in scores.moved] == [(0.9, pytest.approx(0.72), 0.73)]
+    scores = score_recorded([plain([own]), case((weak,), [])], [])
+    assert scores.moved[0].found is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("given", "wanted"),
+    [
+        (("--vessel", "milliampere"), "--vessel: the profile of a real recording, found no --real"),
+        (("--real", "none.toml"), "none.toml: cannot be read as a list of recordings"),
+        (("--real", str(BAG), "--vessel", "milliampere"), "no recording can be used. The first: "),
+    ],
+)
+def test_the_command_refuses_in_one_line(ferryid_run: Any, tmp_path: Path, given: tuple[str, ...], wanted: str) -> None:
+    run = ferryid_run("prove", *given, "--processes", "1", "--out", tmp_path / "out")
+    assert run.code == 2
+    (line,) = run.err.splitlines()
+    assert wanted in line
+    assert "Fix: " in line
+    assert not (tmp_path / "out").exists()

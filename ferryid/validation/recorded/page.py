@@ -15,7 +15,7 @@ from ferryid.types import Floats
 from ferryid.validation.detection_curves import Curve
 from ferryid.validation.estimate_errors import WITHIN, EstimateErrors
 from ferryid.validation.recorded.effects import ACTUATOR, LOAD, SENSOR, concealments
-from ferryid.validation.recorded.scores import DoseResponse, Later, RecordedScores, recorded_targets
+from ferryid.validation.recorded.scores import DoseResponse, Later, Moved, RecordedScores, recorded_targets
 
 BEYOND = 1.3
 """How far the axis of a detection curve goes beyond the sizes tried, as a factor."""
@@ -70,6 +70,7 @@ def page(result: Mapping[str, Any], scores: RecordedScores) -> str:
         ],
         "responses": [_row(one) for one in scores.responses],
         "later": [_later(one) for one in scores.later],
+        "moved": [_moved(one) for one in scores.moved],
         "wrong": _counts(scores.wrong_names),
         "gone": _counts(scores.gone_names),
         "every": every,
@@ -96,6 +97,12 @@ def _later(one: Later) -> tuple[str, ...]:
     found = "none" if one.found_s is None else f"{one.found_s:.0f}"
     size = f"{one.size:.2g} {concealments()[one.effect].unit}"
     return one.effect, one.recording, size, f"{one.onset_s:.0f}", outcome, found
+
+
+def _moved(one: Moved) -> tuple[str, ...]:
+    found = "not found" if one.found is None else f"{one.found:.3g} ({one.low:.3g} to {one.high:.3g})"
+    numbers = (f"{value:.3g}" for value in (one.before, one.concealed, one.expected))
+    return one.effect, one.recording, one.parameter, *numbers, found
 
 
 def _detected(one: DoseResponse) -> Detected:

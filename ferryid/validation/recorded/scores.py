@@ -99,6 +99,33 @@ class Later(Record):
 
 
 @dataclass(frozen=True)
+class Moved(Record):
+    """A parameter of an effect that a recording has already, as a name or a hint, before and after more of it was concealed.
+
+    Attributes
+    ----------
+    effect, recording, parameter
+        Which it is.
+    before, concealed
+        Estimate in the recording as it was, and the value that was concealed.
+    expected
+        Both together: their product for a factor, else their sum.
+    found, low, high
+        Estimate in the altered recording with its 95 % interval; None where it is not found there.
+    """
+
+    effect: str
+    recording: str
+    parameter: str
+    before: float
+    concealed: float
+    expected: float
+    found: float | None
+    low: float | None
+    high: float | None
+
+
+@dataclass(frozen=True)
 class RecordedScores(Record):
     """All figures of merit.
 
@@ -112,6 +139,8 @@ class RecordedScores(Record):
         By effect and recording, of effects that act all along.
     later
         Of effects that began within a recording.
+    moved
+        Parameters of effects that a recording has already.
     right
         Share of cases whose effect is named.
     wrong, wrong_names
@@ -130,6 +159,7 @@ class RecordedScores(Record):
     unaltered: tuple[Unaltered, ...]
     responses: tuple[DoseResponse, ...]
     later: tuple[Later, ...]
+    moved: tuple[Moved, ...]
     right: Share
     wrong: Share
     wrong_names: Mapping[str, int]
@@ -163,6 +193,7 @@ def score_recorded(results: Sequence[CaseResult], not_made: Sequence[NotMade]) -
         tuple(_unaltered(one) for one in plain.values()),
         _responses(altered, plain),
         tuple(_later(one, plain[one.case.path]) for one in fresh if one.case.kind == "span"),
+        tuple(moved for one in altered if one.case.kind == "single" for moved in _moved(one, plain[one.case.path])),
         Share(sum(one.truths[0].key in names(one) for one in differences), len(differences)),
         Share(sum(map(bool, wrong)), len(wrong)),
         Counter(label(key) for keys in wrong for key in keys),
@@ -275,6 +306,26 @@ def _sure(result: CaseResult, plain: CaseResult) -> CaseResult:
     key = result.truths[0].key
     findings = tuple(replace(one, probability=1.0) if one.key == key else one for one in result.diagnosis.findings)
     return replace(result, diagnosis=replace(result.diagnosis, findings=findings))
+
+
+def _moved(result: CaseResult, plain: CaseResult) -> list[Moved]:
+    truth = result.truths[0]
+    known = concealments()[truth.effect]
+    before, after = (
+        next((one for one in each.diagnosis.findings if one.key == truth.key), None) for each in (plain, result)
+    )
+    if before is None or known.positions:
+        return []
+    made = []
+    for name, value in truth.values.items():
+        if name not in before.parameters:
+            continue
+        own = before.parameters[name].value
+        found = None if after is None else after.parameters.get(name)
+        numbers = (None, None, None) if found is None else (found.value, found.low, found.high)
+        expected = own * value if known.neutral == 1.0 else own + value
+        made.append(Moved(label(truth.key), result.case.path, name, own, value, expected, *numbers))
+    return made
 
 
 def _later(result: CaseResult, plain: CaseResult) -> Later:
