@@ -12,6 +12,9 @@ import pytest
 from ferryid.effects import effects
 from ferryid.effects.force_model import Measurements, hull_of, required_force
 from ferryid.effects.measurements import hull_force_model
+from ferryid.ingest import open_log
+from ferryid.ingest.log import Series
+from ferryid.simulate.recorders import write_json_mcap
 from ferryid.simulate.sensors import quaternion
 from ferryid.types import Floats
 from ferryid.validation.case import Truth
@@ -94,6 +97,25 @@ def test_a_heading_turns_and_the_tilt_stays() -> None:
     wanted = quaternion(np.full(n, 0.1), np.full(n, -0.2), np.full(n, 1.5))
     for name, values in zip(names, wanted, strict=True):
         assert np.allclose(made.columns[name], values), name
+
+
+def test_paths_of_messages_lead_where_they_led(tmp_path: Path) -> None:
+    receive = np.array([5, 3, 9], dtype=np.int64) + 1_700_000_000_000_000_000
+    columns = {
+        "a.b": np.array([1.5, np.nan, -2.0]),
+        "c[2].d": np.array([1, 2, 3]),
+        "c[0].d": np.arange(3.0),
+        "e[1]": np.arange(3.0),
+    }
+    path = tmp_path / "paths.mcap"
+    write_json_mcap([Series("/some/topic", receive, receive - 7, columns)], path)
+    read = open_log(path).read({"/some/topic": list(columns)})["/some/topic"]
+    order = [1, 0, 2]
+    assert read.receive_ns.tolist() == receive[order].tolist()
+    assert read.stamp_ns is not None
+    assert read.stamp_ns.tolist() == (receive[order] - 7).tolist()
+    for name, values in columns.items():
+        assert np.array_equal(read.columns[name].astype(float), values[order].astype(float), equal_nan=True), name
 
 
 def test_times_are_written_to_the_nanosecond() -> None:
@@ -205,6 +227,11 @@ def test_a_gain_from_a_time_on() -> None:
     ratio, t = after.columns["F_propeller"] / log.columns["F_propeller"], log.times("table")
     assert np.allclose(ratio[t < 30.0], 1.0)
     assert np.allclose(ratio[t >= 30.0], 2.0)
+    # Rows that stay keep their raw value to the last bit, whatever the way to SI units and back does.
+    series, speed, early = log.series["table"], log.columns["n_propeller"], t < 30.0
+    made = with_columns(log.profile, series, {"n_propeller": np.where(early, speed, 1.1 * speed)}).columns["n"]
+    assert np.array_equal(made[early], series.columns["n"][early])
+    assert np.allclose(made[~early], 1.1 * series.columns["n"][~early])
 
 
 def test_a_race_takes_the_plants_share() -> None:
