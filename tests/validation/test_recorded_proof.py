@@ -117,7 +117,12 @@ def test_what_counts_is_the_difference() -> None:
         case((ARM,), [arm, finding("mooring")]),
         case((ARM,), [], size=0.1),
     ]
-    scores = score_recorded(results, [NotMade("a", "wind", 0.0, "wind cannot be concealed in a: no areas.")])
+    lacking = [
+        NotMade("a", "wind", 0.0, "wind cannot be concealed in a: no areas."),
+        *(NotMade("a", "payload", size, "payload: 4 % of the rows cannot express it, as so.") for size in (0.3, 0.5)),
+        NotMade("b", "", 0.0, "b.bag: too short. Fix: none"),
+    ]
+    scores = score_recorded(results, lacking)
     assert scores.runs == 6
     assert scores.unaltered[0].named == ("time_delay",)
     assert scores.unaltered[0].hinted == ("mooring",)
@@ -141,7 +146,12 @@ def test_what_counts_is_the_difference() -> None:
     }
     text = page(result, scores)
     assert "| a | boat | explained | 2 | time_delay | mooring |" in text
-    assert "- wind cannot be concealed in a: no areas." in text
+    assert (
+        "- a: wind (no areas); payload of 0.3 and 0.5 share of the mass (more than 2 % of the rows cannot express it, as so)."
+        in text
+    )
+    assert "- b: b.bag: too short. Fix: none." in text
+    assert "| Sensors | 60.0 % (3/5)" in text
     assert "2 time_delay" in text
 
 

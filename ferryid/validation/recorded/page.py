@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import Any
 
@@ -14,6 +14,8 @@ from ferryid.report.validation_figures import Answers, Detected, detection_curve
 from ferryid.types import Floats
 from ferryid.validation.detection_curves import Curve
 from ferryid.validation.estimate_errors import WITHIN, EstimateErrors
+from ferryid.validation.name_scores import Share
+from ferryid.validation.recorded.case_sampling import NotMade
 from ferryid.validation.recorded.effects import ACTUATOR, LOAD, SENSOR, concealments
 from ferryid.validation.recorded.scores import DoseResponse, Later, Moved, RecordedScores, recorded_targets
 
@@ -78,6 +80,7 @@ def page(result: Mapping[str, Any], scores: RecordedScores) -> str:
         "errors": [_errors(one) for one in scores.recoveries[1:]],
         "noticed_errors": [_errors(one) for one in scores.noticed_recoveries[1:]],
         "not_made": _not_made(scores),
+        "by_family": _by_family(scores),
         "figures": figures(scores),
     }
     return template("validation_recorded.md").render(context)
@@ -132,22 +135,46 @@ def _errors(one: EstimateErrors) -> tuple[Any, ...]:
 
 
 def _not_made(scores: RecordedScores) -> list[str]:
-    """Return one line for each recording and reason, with the sizes together."""
-    sizes: dict[tuple[str, str, str], list[float]] = {}
+    """Return a line for each recording: effects that it cannot carry by their reasons, and sizes that it cannot."""
+    lines: dict[str, dict[str, list[NotMade]]] = {}
     for one in scores.not_made:
-        reason = one.why.rpartition(" rows cannot express it, ")[2] if one.size else one.why
-        sizes.setdefault((one.recording, one.effect, reason), []).append(one.size)
-    lines = []
-    for (recording, effect, reason), some in sizes.items():
-        if some[0]:
-            least, most, unit = min(some), max(some), concealments()[effect].unit
-            lines.append(
-                f"{effect} of {least:.3g} to {most:.3g} {unit} ({counted(len(some), 'case')}) was not made in {recording}: "
-                f"more than 2 % of the rows cannot express it, {reason}"
+        reason = one.why
+        if one.effect:
+            reason = one.why.partition(f" cannot be concealed in {one.recording}: ")[2] or one.why
+        if one.size:
+            reason = (
+                f"more than 2 % of the rows cannot express it, {one.why.rpartition(' rows cannot express it, ')[2]}"
             )
-        else:
-            lines.append(reason)
-    return lines
+        lines.setdefault(one.recording, {}).setdefault(reason.removesuffix("."), []).append(one)
+    return [
+        f"{recording}: {'; '.join(_lacking(reason, some) for reason, some in by_reason.items())}."
+        for recording, by_reason in lines.items()
+    ]
+
+
+def _lacking(reason: str, some: Sequence[NotMade]) -> str:
+    """Return effects, or sizes of one, with the reason why a recording lacks them."""
+    if not some[0].effect:
+        return reason
+    parts = []
+    for effect in dict.fromkeys(one.effect for one in some):
+        sizes = [one.size for one in some if one.effect == effect and one.size]
+        unit = concealments()[effect].unit
+        parts.append(f"{effect} of {' and '.join(f'{size:.3g}' for size in sizes)} {unit}" if sizes else effect)
+    return f"{', '.join(parts)} ({reason})"
+
+
+def _by_family(scores: RecordedScores) -> list[tuple[str, ...]]:
+    """Return for each family how many doses there were, were named, and were named or a new hint."""
+    rows = list[tuple[str, ...]]()
+    for family, title in FAMILIES.items():
+        some = [one for one in scores.responses if concealments()[one.effect].family == family]
+        some_later = [one for one in scores.later if concealments()[one.effect].family == family]
+        named = [flag for one in some for flag in one.named] + [one.named for one in some_later]
+        noticed = [flag for one in some for flag in one.noticed] + [one.noticed for one in some_later]
+        if named:
+            rows.append((title, Share(sum(named), len(named)).text, Share(sum(noticed), len(noticed)).text))
+    return rows
 
 
 def _list(names: tuple[str, ...]) -> str:
