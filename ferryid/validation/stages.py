@@ -68,7 +68,7 @@ def write_case(generate: Generate, logs: Path, case: Case) -> dict[str, Any]:
         more = tuple(path.name for path in made.more)
         other = {path.name for path in temporary.iterdir()} - {made.log.name, made.profile.name, *more}
         if other:  # it may be an answer
-            raise ValueError(f"beside logs there may be their profile only, found {', '.join(sorted(other))}")
+            raise ValueError(f"beside a log there may be its profile only, found {', '.join(sorted(other))}")
     return CaseFiles(made.log.name, made.profile.name, more).to_json()
 
 
