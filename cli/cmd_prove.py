@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ferryid.cli.options import OUT, Json, MaybeVessel, Out
+from ferryid.cli.options import OUT, Json, Out, Vessel
 from ferryid.cli.output import emit, progress, tell
 
 
@@ -28,11 +28,9 @@ def command(
     ] = None,
     real: Annotated[
         str | None,
-        typer.Option(
-            help="Conceal the effects in real recordings: a TOML file that lists them, or a log, with --vessel its profile."
-        ),
+        typer.Option(help="Conceal the effects in real recordings: a TOML file that lists them, or a log."),
     ] = None,
-    vessel: MaybeVessel = None,
+    vessel: Vessel = None,
     check: Annotated[
         Path | None,
         typer.Option(help="Only check the answers.json of this folder against the commitment in its seal.json."),
@@ -56,7 +54,7 @@ def command(
         runs=runs,
         only=cells,
         real=real,
-        vessel=vessel,
+        vessel=vessel or None,
         processes=processes,
         dask=dask,
         progress=progress,

@@ -723,9 +723,14 @@ def prove(
     from ferryid.validation import evaluators
     from ferryid.validation.recorded.evaluators import recorded_pipeline
     from ferryid.validation.run import render_summary, run_validation
+    from ferryid.vessel import choose_vessel
 
     if real is None and vessel is not None:
         raise FerryIdError("--vessel: the profile of a real recording, found no --real. Fix: give --real with its log")
+    if real is not None and vessel is None and Path(real).suffix.lower() != ".toml":
+        choice = choose_vessel([real], None)
+        _told(choice, announce)
+        vessel = choice.reference
     pipeline = evaluators.pipeline() if real is None else recorded_pipeline(real, vessel)
     result = run_validation(
         Path(out), pipeline, seed=seed, runs=runs, only=only, processes=processes, dask=dask, progress=progress,
