@@ -94,7 +94,7 @@ def sort_out(logs: Sequence[AveragedLog], whose: str) -> tuple[list[AveragedLog]
 
     `whose` are they: what they are left out of.
     """
-    artificial = {one.path: why for one in logs if (why := simulated(one.screened.measured))}
+    artificial = {one.path: why for one in logs if (why := _simulated(one))}
     if artificial and len(artificial) == len(logs):
         return list(logs), [
             f"{path} is no recording of a vessel: {why}. What is found in it is the simulator's."
@@ -117,6 +117,10 @@ def sort_out(logs: Sequence[AveragedLog], whose: str) -> tuple[list[AveragedLog]
         for path, why in wrong.items()
     ]
     return [one for one in kept if one.path not in wrong], notes
+
+
+def _simulated(log: AveragedLog) -> str:
+    return simulated(log.screened.measured.survey.recording, log.screened.measured.measurements)
 
 
 def _clocks(logs: Sequence[AveragedLog]) -> tuple[str, ...]:
@@ -168,10 +172,10 @@ def without_logs(references: Gathered, logs: Sequence[AveragedLog]) -> Gathered:
         Where none is left.
     """
     again = dict(repeated([*logs, *references.logs]))
-    real = not all(simulated(one.screened.measured) for one in logs)
+    real = not all(_simulated(one) for one in logs)
     wrong = {one.path: f"it holds the motion of {again[one.path]}" for one in references.logs if one.path in again}
     for one in references.logs:
-        if real and (why := simulated(one.screened.measured)):
+        if real and (why := _simulated(one)):
             wrong.setdefault(one.path, f"it is simulated and the logs are recorded, {why}")
     kept = tuple(one for one in references.logs if one.path not in wrong)
     if not kept:

@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from ferryid.simulate import parse_scenario, simulate, write_log
-from tests.cli.conftest import Run
 from tests.cli.test_every_command import conforms
+from tests.command_line.in_process import Run
 
 pytestmark = pytest.mark.slow
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from tests.cli.conftest import Run
+from tests.command_line.in_process import Run
 from tests.damage import NAVIGATION, THRUSTER, silent, ten_minutes, without_heading, written
 
 pytestmark = pytest.mark.slow

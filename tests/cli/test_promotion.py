@@ -13,8 +13,8 @@ from ferryid.compare.comparison_result import Ratio
 from ferryid.compare.replay import ReplayRow
 from ferryid.models.store import load
 from ferryid.report import promotion
-from tests.cli.conftest import invoke
 from tests.cli.test_every_command import SCALE, THESIS, conforms
+from tests.command_line.in_process import invoke
 
 pytestmark = pytest.mark.slow
 

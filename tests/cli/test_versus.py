@@ -11,9 +11,9 @@ import pytest
 
 from ferryid import api
 from ferryid.simulate import parse_scenario, simulate, write_log
-from tests.cli.conftest import Run
 from tests.cli.test_diagnose_input import refused
 from tests.cli.test_every_command import conforms
+from tests.command_line.in_process import Run
 
 VESSEL = ("--vessel", "milliampere")
 SCENARIO = """schema = "ferryid.scenario/1"

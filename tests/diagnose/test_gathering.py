@@ -134,9 +134,7 @@ def test_simulated_logs_among_recorded_ones_are_left_out(
     logs: tuple[AveragedLog, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     artificial = {logs[0].path}
-    monkeypatch.setattr(
-        gathering, "simulated", lambda measured: "it has no noise" if measured.path in artificial else ""
-    )
+    monkeypatch.setattr(gathering, "_simulated", lambda one: "it has no noise" if one.path in artificial else "")
     kept, (note,) = sort_out(logs[:2], "references")
     assert kept == [logs[1]]
     assert note.startswith(f"Left out of the references: {logs[0].path}: it is simulated among recorded logs")

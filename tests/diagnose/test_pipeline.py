@@ -111,7 +111,7 @@ def test_a_calm_log_matches(tmp_path: Path) -> None:
     assert result.before["window_s"] == pytest.approx(8.0)
 
 
-def test_a_squall_that_no_steady_wind_explains_is_not_matched(tmp_path: Path) -> None:
+def test_a_squall_is_a_wind_that_gets_up_and_drops(tmp_path: Path) -> None:
     rows = [(0.0, 0.0), (272.0, 0.0), (287.0, 1.0), (412.0, 1.0), (427.0, 0.0)]
     text = "time,north,east\n" + "".join(f"{t:.1f},{3.4 * share:.3f},{-1.6 * share:.3f}\n" for t, share in rows)
     (tmp_path / "wind.csv").write_text(text, encoding="utf-8")
@@ -124,5 +124,14 @@ def test_a_squall_that_no_steady_wind_explains_is_not_matched(tmp_path: Path) ->
     log = tmp_path / "squall.mcap"
     write_log(simulate(parse_scenario(scenario, "squall", tmp_path), 3), log)
     result = diagnose([str(log)], load_profile("milliampere"), DiagnosisSettings(), IN_MEMORY)[0]
-    assert result.verdict in ("unexplained", "partly_explained")
-    assert not [one for one in result.findings if one.sure and one.effect not in ("wind", "gusts", "unknown")]
+    assert result.verdict == "explained"
+    (wind,) = [one for one in result.findings if one.sure]
+    assert wind.effect == "wind"
+    assert all(
+        wind.parameters[name].low < true < wind.parameters[name].high for name, true in (("north", 3.4), ("east", -1.6))
+    )
+    # It rises and falls within a quarter of a minute.
+    assert wind.onset_s is not None
+    assert wind.offset_s is not None
+    assert 272.0 < wind.onset_s < 287.0
+    assert 412.0 < wind.offset_s < 427.0

@@ -51,7 +51,9 @@ NO_DECISION = {
         diagnose.inference.group_differences SCATTERS
         effects.shallow_water EDGE_M
         effects.thruster_interaction SHARPNESS
+        effects.dead_band RISE SIZE LARGEST DIRECT_MPS2 DIRECT_LARGEST_MPS2
         effects.external_push USUAL_MPS2 ARM
+        effects.thrust_saturation ROUNDING SIZE START LOWEST
         effects.ventilation WIDTH
         effects.waves USUAL_HZ USUAL_M
         effects.wind COEFFICIENTS
@@ -108,6 +110,8 @@ NO_DECISION = {
         diagnose.inference.campaign_model DIFFERENCE_STEP
         diagnose.inference.campaign_estimation STARTS BEARINGS STEADY_SHARE HALVINGS SCALE_ROUNDS
         diagnose.inference.campaign_properties WEIGHED
+        effects.actuator_force _NODES
+        effects.dead_band NODES
         diagnose.inference.change_points LEVELS
         diagnose.inference.estimation MAX_ITERATIONS HULL_SLOPE_ITERATIONS CONVERGED_GAIN HULL_DIFFERENCE DAMPINGS
         diagnose.inference.estimation PARAMETER_DIFFERENCE LONGEST_STEP

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -48,8 +49,8 @@ class Here:
 
     sources = source_hash()
 
-    def diagnose(self, log: Path, profile: Path, out: Path) -> Diagnosis:
-        return diagnose_log(log, profile, out)
+    def diagnose(self, log: Path, profile: Path, out: Path, more: Sequence[Path] = ()) -> Diagnosis:
+        return diagnose_log(log, profile, out, more)
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from tests.cli.conftest import invoke
+from tests.command_line.in_process import invoke
 from tests.wavy import wavy as study
 from tests.wavy.wavy import AXES, lines, wavy
 

@@ -7,17 +7,12 @@ of time to the last digit: no sensor measures that, so that the positions are no
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ferryid.diagnose.data.thresholds import DATA
 from ferryid.effects.force_model import Measurements
 from ferryid.signals.stream import Recording, Stream
 from ferryid.types import Floats
-
-if TYPE_CHECKING:
-    from ferryid.diagnose.data.measurements import MeasuredLog
 
 SIMULATORS = (
     "gazebo_msgs/",
@@ -30,16 +25,15 @@ SIMULATORS = (
 VELOCITIES = (("u", "v"), ("vel_N", "vel_E"))
 
 
-def simulated(log: MeasuredLog) -> str:
+def simulated(recording: Recording, measurements: Measurements) -> str:
     """Return what shows that a log is a simulator's, as the end of a sentence; empty where nothing does."""
-    recording = log.survey.recording
     if why := artificial(recording):
         return why
     measured = any(all(name in recording.found for name in pair) for pair in VELOCITIES)
     if not (measured and "r" in recording.found):
         # Velocities that are derived from the positions agree with them.
         return ""
-    noise = relative_noise(log.measurements)
+    noise = relative_noise(measurements)
     if bool((noise < DATA.no_noise).all()):
         return (
             "its positions, headings and velocities have no noise: they agree to "

@@ -9,7 +9,6 @@ from typing import cast
 import numpy as np
 import pytest
 
-from ferryid.diagnose.data.measurements import MeasuredLog, Survey
 from ferryid.diagnose.data.simulated import artificial, relative_noise, simulated, summed_share
 from ferryid.effects.force_model import Measurements
 from ferryid.ingest.clocks import ClockReport
@@ -52,16 +51,18 @@ def circling(noise_m: float = 0.0) -> Measurements:
     )
 
 
-def log(measurements: Measurements, found: tuple[str, ...] = ("u", "v", "r"), type_: str = "") -> MeasuredLog:
+def log(
+    measurements: Measurements, found: tuple[str, ...] = ("u", "v", "r"), type_: str = ""
+) -> tuple[Recording, Measurements]:
     topics = (Topic("/gazebo/model_states", type_, "ros1", 10, 0, 1, {}),) if type_ else ()
     recording = SimpleNamespace(topics=topics, found=dict.fromkeys(found, ""), streams={})
-    return MeasuredLog("a.bag", measurements, cast("Survey", SimpleNamespace(recording=recording)))
+    return cast("Recording", recording), measurements
 
 
 def test_a_log_without_noise_is_simulated_and_one_with_a_millimetre_is_not() -> None:
     assert relative_noise(circling()).max() < 1e-4
-    assert "no noise" in simulated(log(circling()))
-    assert simulated(log(circling(0.001))) == ""
+    assert "no noise" in simulated(*log(circling()))
+    assert simulated(*log(circling(0.001))) == ""
 
 
 def reckoned(away_m: float = 0.0, jumps: int = 0, varied: float = 0.3) -> Stream:
@@ -93,15 +94,15 @@ def test_steps_of_a_constant_speed_show_nothing() -> None:
 
 
 def test_velocities_that_come_from_positions_say_nothing() -> None:
-    assert simulated(log(circling(), found=("x", "y", "psi"))) == ""
+    assert simulated(*log(circling(), found=("x", "y", "psi"))) == ""
 
 
 @pytest.mark.parametrize(("type_", "artificial"), [("gazebo_msgs/ModelStates", True), ("nav_msgs/Odometry", False)])
 def test_messages_of_a_simulator_show_it(type_: str, artificial: bool) -> None:
-    assert bool(simulated(log(circling(0.02), type_=type_))) == artificial
+    assert bool(simulated(*log(circling(0.02), type_=type_))) == artificial
 
 
 def test_a_log_at_rest_is_not_simulated() -> None:
     still = circling()
     at_rest = replace(still, nu_raw=np.zeros_like(still.nu_raw), eta=np.zeros_like(still.eta))
-    assert simulated(log(at_rest)) == ""
+    assert simulated(*log(at_rest)) == ""

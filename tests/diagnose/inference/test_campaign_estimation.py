@@ -161,6 +161,7 @@ def test_two_conditions_that_are_confirmed_alike_are_hints(monkeypatch: pytest.M
 
     both = campaign(conditions=("wind", "current"))
     monkeypatch.setattr(campaign_conditions, "_tested", tested)
+    monkeypatch.setattr(campaign_conditions, "_against_others", lambda one, *_: one)
     # Neither is seen beside the other.
     monkeypatch.setattr(campaign_conditions, "_beside", lambda *_: None)
     behind["current"] = 1.0
