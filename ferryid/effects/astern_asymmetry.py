@@ -71,6 +71,7 @@ EFFECT = Effect(
     instances=instances,
     cannot=cannot,
     cannot_be_of=cannot_be_of,
+    of_thrust_curve=True,
     vessel=True,
     regressor=regressor,
     formula_error=EFFECTS.definition_error,

@@ -192,6 +192,8 @@ class Effect:
     doubt
         ``doubt(values, profile)`` returns why values by name are not credible of a vessel, or may stand in for something else,
         whatever the data say, as the end of a sentence; empty where they are as they may be.
+    of_thrust_curve
+        True where it is another shape of an actuator's thrust curve, and so may be the profile's error.
     of_log
         Of a condition that steadily acts on a whole log: names of the parameters that each log of a vessel has its own of; the
         others are the vessel's. Empty for what is no such condition.
@@ -234,6 +236,7 @@ class Effect:
     of_sensor: bool = False
     unsteady: Callable[[ForceModel], Processes] | None = None
     doubt: Callable[[Values, Profile], str] = lambda values, profile: ""
+    of_thrust_curve: bool = False
     of_log: tuple[str, ...] = ()
     turbulence: Turbulence | None = None
     absent_in: tuple[str, ...] = ()

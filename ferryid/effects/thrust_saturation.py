@@ -125,6 +125,7 @@ EFFECT = Effect(
     instances=instances,
     cannot=cannot,
     cannot_be_of=cannot_be_of,
+    of_thrust_curve=True,
     vessel=True,
     piecewise=True,
     unreported=unreported,

@@ -128,6 +128,7 @@ EFFECT = Effect(
     instances=instances,
     cannot=cannot,
     cannot_be_of=cannot_be_of,
+    of_thrust_curve=True,
     vessel=True,
     regressor=regressor,
     negligible=EFFECTS.least_ventilation,

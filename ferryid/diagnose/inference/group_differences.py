@@ -97,8 +97,11 @@ def in_groups(campaign: Campaign, names: Sequence[str]) -> Campaign:
 def differences_of(campaign: Campaign) -> list[Candidate]:
     """Return every difference that no log rules out and, of an actuator, some log of each group can show.
 
-    One whose neutral value is an end of what is possible, as a lag or a load, may act in either group.
+    One whose neutral value is an end of what is possible, as a lag or a load, may act in either group. The shape of a thrust
+    curve is as uncertain in one group as in the other: that it differs is sought beside the same shape in all logs only, or an
+    error of the curve would be taken for a difference.
     """
+    shared = {one.key for one in campaign.properties if not one.group}
     profile = campaign.members[0].windows.measurements.profile
     found = []
     for one in effects().values():
@@ -107,6 +110,8 @@ def differences_of(campaign: Campaign) -> list[Candidate]:
             continue
         for instance in one.instances(profile):
             candidate = Candidate.of(one, instance, profile)
+            if one.of_thrust_curve and candidate.key not in shared:
+                continue
             if candidate.parameters and _shown_in_each_group(candidate, campaign):
                 found += [replace(candidate, group=group) for group in _groups(candidate)]
     return [*found, *_all_thrusters(campaign)]

@@ -11,9 +11,11 @@ import pytest
 
 from ferryid.diagnose.inference.campaign_estimation import estimate_campaign
 from ferryid.diagnose.inference.campaign_model import Campaign, Member
+from ferryid.diagnose.inference.campaign_properties import properties_of
 from ferryid.diagnose.inference.group_differences import compare_near, differences_of, in_groups
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.group_differences import JudgedGroups, judge_groups, smallest_note, summary
+from ferryid.effects import effects
 from ferryid.types import no_progress
 from tests.diagnose.inference.test_campaign_properties import weakened
 
@@ -90,6 +92,16 @@ def test_logs_of_one_group_that_scatter_make_no_difference() -> None:
     # Half of what the logs differ by is no difference of the groups.
     assert scattered.errors[0] > 0.05
     assert scattered.evidence < INFERENCE.prior_odds
+
+
+def test_another_shape_of_a_thrust_curve_is_a_difference_beside_that_of_all_logs_only() -> None:
+    campaign = groups((1.0, 1.0, 1.0), "ABB")
+    curves = {one.id for one in effects().values() if one.of_thrust_curve}
+    assert "astern_asymmetry" in curves
+    assert not [one for one in differences_of(campaign) if one.effect.id in curves]
+    shared = [one for one in properties_of(campaign) if one.effect.id == "astern_asymmetry"][:1]
+    found = [one for one in differences_of(replace(campaign, properties=tuple(shared))) if one.effect.id in curves]
+    assert {one.key for one in found} == {one.key for one in shared}
 
 
 def test_a_difference_acts_in_its_group_alone() -> None:
