@@ -39,12 +39,15 @@ class Recipe:
         Settings of the fit.
     withhold
         Signals to hide from the diagnosis, and to compare afterwards.
+    versus
+        Whether the first and the last logs of a vessel are compared as groups, see `ferryid.batch.changes`.
     """
 
     steps: tuple[str, ...] = STEPS
     model: str = ""
     fit: FitSettings = field(default_factory=FitSettings)
     withhold: tuple[str, ...] = ()
+    versus: bool = True
 
     def plain(self) -> dict[str, Any]:
         """Return what of it the results of a log depend on, but for the model, whose content counts."""
@@ -96,14 +99,17 @@ class _Reader:
         if not isinstance(model, str):
             raise self._fault(("model",), f'"model" is text, found {model!r}. Fix: write it in quotes')
         diagnose = self._section(data, "diagnose")
-        self._known(diagnose, ("diagnose",), ("withhold",))
+        self._known(diagnose, ("diagnose",), ("withhold", "versus"))
         withhold = self._texts(diagnose, ("diagnose", "withhold"), ())
         try:
             check_withheld(withhold)
         except FerryIdError as error:
             raise self._fault(("diagnose", "withhold"), str(error)) from error
+        versus = diagnose.get("versus", True)
+        if not isinstance(versus, bool):
+            raise self._fault(("diagnose", "versus"), f'"versus" is true or false, found {versus!r}. Fix: correct it')
         chosen = tuple(step for step in STEPS if step in steps)
-        return Recipe(chosen, model, self._fit(self._section(data, "fit")), tuple(withhold))
+        return Recipe(chosen, model, self._fit(self._section(data, "fit")), tuple(withhold), versus)
 
     def _fit(self, section: Mapping[str, Any]) -> FitSettings:
         kinds = {one.name: str(one.type).split(" | ") for one in FitSettings.options()}

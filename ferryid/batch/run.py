@@ -19,6 +19,13 @@ from typing import Any
 
 from ferryid import __version__
 from ferryid.batch import memory
+from ferryid.batch.changes import (
+    compare_groups_of,
+    forget_others,
+    group_tasks,
+    kept_change,
+    lost_groups,
+)
 from ferryid.batch.kept import Kept, key_of
 from ferryid.batch.log_result import LogResult
 from ferryid.batch.logs import Entry, entries_of
@@ -35,7 +42,7 @@ from ferryid.ingest import open_log
 from ferryid.ingest.hashing import content_hash
 from ferryid.models import Model, model_to_json
 from ferryid.report.batch_page import render
-from ferryid.report.batch_rows import BatchResult, MemoryUse
+from ferryid.report.batch_rows import BatchResult, Change, MemoryUse
 from ferryid.report.diagnosis_report import patient
 from ferryid.signals.recording import log_name
 from ferryid.signals.time_ranges import as_text
@@ -120,9 +127,12 @@ def batch(
         _tell_done(tell, [row.status for _, row in rows.values()], [tasks[number] for number in left], kept)
         if left:
             _carry_out([tasks[number] for number in left], left, rows, len(tasks), processes, dask, progress, tell)
-        progress("writing the summary")
         results = [rows[number] for number in range(len(entries))]
         result = _summed_up(entries, results, already, patients, chosen, limit, out, begun)
+        logs = {row.log: task.log for row, task in zip(result.rows, tasks, strict=True)}
+        groups = partial(_changes, result, logs, patients, chosen, out.resolve(), ranges, limit, processes, dask)
+        result = replace(result, changes=groups(again, progress, tell), seconds=time.monotonic() - begun)
+        progress("writing the summary")
         write_table(folder / "summary.parquet", table_of(result.rows))
         write_text(folder / "index.html", render(result))
         write_text(folder / "batch.json", dump_json(result.to_json()))
@@ -261,6 +271,43 @@ def _carry_out(
             show()
 
 
+def _changes(
+    result: BatchResult,
+    logs: Mapping[str, str],
+    patients: Mapping[str | None, tuple[Profile, Model | None]],
+    recipe: Recipe,
+    out: Path,
+    ranges: TimeRanges,
+    limit: int,
+    processes: int,
+    dask: str | None,
+    again: bool,
+    progress: Callable[[str], None],
+    tell: Callable[[str], None],
+) -> tuple[Change, ...]:
+    """Return what changed in each vessel whose logs allow a comparison; what an earlier run found is not done again."""
+    if not recipe.versus or "diagnose" not in recipe.steps:
+        return ()
+    vessels = {profile.name: (profile, model) for profile, model in patients.values()}
+    folder = out / "batch" / "changes"
+    tasks = group_tasks(result.rows, logs, result.trends, vessels, folder, out, recipe.withhold, ranges, limit)
+    forget_others(folder, tasks)
+    found: dict[int, Change] = {}
+    for number, task in enumerate(tasks):
+        change = kept_change(task.folder)
+        if change is not None and not (again and change.problem):
+            found[number] = change
+    left = [number for number in range(len(tasks)) if number not in found]
+    if left:
+        with spread(processes, dask, apart=True) as workers:
+            progress(f"comparing the first and the last logs of {counted(len(left), 'vessel')}")
+            for number, change in workers.over(compare_groups_of, [tasks[one] for one in left], lost=lost_groups):
+                found[left[number]] = change
+                if change.problem:
+                    tell(one_line(change.sentence))
+    return tuple(found[number] for number in range(len(tasks)))
+
+
 def _summed_up(
     entries: Sequence[Entry],
     found: Sequence[tuple[Path, LogResult]],
@@ -289,6 +336,7 @@ def _summed_up(
         page=str(root / "index.html"),
         rows=rows,
         trends=trends_of(rows, {profile.name: profile for profile, _ in patients.values()}),
+        changes=(),
         seconds=time.monotonic() - begun,
     )
 
@@ -310,6 +358,9 @@ def render_batch(result: BatchResult) -> str:
         told = f"{median(ratios):.3f} of its base model's, median of {counted(len(ratios), 'log')}"
         lines.append(f"  force MSE of {judged[0].evaluated}: {told}")
     lines += [f"  {trend.sentence}" for trend in result.trends if trend.sentence]
+    for change in result.changes:
+        if not change.problem:
+            lines += [f"  {change.sentence}", *(f"    {one}" for one in change.differences)]
     peak = result.memory.peak_bytes
     bound = f"at most {memory.told_bytes(result.memory.limit_bytes)} allowed"
     held = bound if result.memory.bounded else "no bound: this system keeps none"

@@ -153,7 +153,7 @@ def _row(task: Task) -> LogResult:
     except UnwritableError:
         raise
     except Exception as error:  # noqa: BLE001 - whatever one log shows is told in its row, and the others go on
-        status, reason = _told(task, error)
+        status, reason = _how(task, error)
         row = replace(row, status=status, reason=reason)
         if status == FAILED:
             write_text(task.folder / TRACEBACK, "".join(traceback.format_exception(error)))
@@ -196,7 +196,7 @@ def _carry_out(task: Task, row: LogResult) -> Iterator[LogResult]:
         except UnwritableError:
             raise
         except FerryIdError as error:
-            status, reason = _told(task, error)
+            status, reason = _how(task, error)
             if status != REFUSED:
                 raise
             # A log too short for a fit may well be evaluated.
@@ -224,8 +224,27 @@ def _lost(recording: Recording, profile: Profile) -> LostData:
     return LostData.of(recording.losses, measured.left_out, rows + int(measured.usable.sum()))
 
 
-def _told(task: Task, error: Exception) -> tuple[str, str]:
-    """Return how a log ends with an error, and why in one line.
+def _how(task: Task, error: Exception) -> tuple[str, str]:
+    """Return how a log ends with an error, and why; whoever reports it names the log."""
+    status, reason = how_it_ended(error, task.folder, task.log, task.memory_bytes)
+    if status == REFUSED and isinstance(error, FerryIdError):
+        reason = reason.removeprefix(f"{task.log}: ").removeprefix(f"{task.name}: ")
+    return status, reason
+
+
+def how_it_ended(error: Exception, folder: Path, subject: str, memory_bytes: int) -> tuple[str, str]:
+    """Return how work ends with an error, of `STATUSES`, and why in one line.
+
+    Parameters
+    ----------
+    error
+        What was raised.
+    folder
+        Where the results were to go.
+    subject
+        What the work was on, for a system's error that names no file.
+    memory_bytes
+        What the process was allowed.
 
     Raises
     ------
@@ -234,18 +253,14 @@ def _told(task: Task, error: Exception) -> tuple[str, str]:
     """
     for cause in _causes(error):
         if isinstance(cause, OSError) and cause.errno in (errno.ENOSPC, errno.EDQUOT):
-            raise unwritable(task.folder, cause) from error
+            raise unwritable(folder, cause) from error
         if isinstance(cause, MemoryError) or str(cause) == "can't start new thread":
-            return (
-                MEMORY,
-                f"needs more than {memory.told_bytes(task.memory_bytes)} of memory. Fix: give more with --memory",
-            )
+            return MEMORY, f"needs more than {memory.told_bytes(memory_bytes)} of memory. Fix: give more with --memory"
     if isinstance(error, FerryIdError):
-        # Whoever tells it says of which log.
-        return REFUSED, str(error).removeprefix(f"{task.log}: ").removeprefix(f"{task.name}: ")
+        return REFUSED, str(error)
     if isinstance(error, OSError):
         return REFUSED, one_line(
-            f"{error.filename or task.log}: {error.strerror or error}. Fix: check the file and the disk"
+            f"{error.filename or subject}: {error.strerror or error}. Fix: check the file and the disk"
         )
     place = traceback.extract_tb(error.__traceback__)[-1]
     return FAILED, one_line(

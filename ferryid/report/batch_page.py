@@ -110,6 +110,14 @@ def render(result: BatchResult) -> str:
         verdicts=sorted(Counter(row.verdict for row in rows if row.verdict).items()),
         accepted=Counter(row.fit for row in rows if row.fit),
         trends=[trend.sentence for trend in result.trends if trend.sentence],
+        changes=[
+            {
+                "sentence": one.sentence,
+                "differences": one.differences,
+                "link": "" if one.report is None else quote(one.report),
+            }
+            for one in result.changes
+        ],
         figures=[*_findings(result.trends), *_errors(result.rows)],
         choices={
             "vessel": sorted({row.vessel for row in rows if row.vessel}),

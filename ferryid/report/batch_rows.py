@@ -1,4 +1,4 @@
-"""The result of a batch: one row a log, and the trends over the rows. The page shows it, ``batch.json`` has all of it."""
+"""The result of a batch: a row a log, trends over the rows, and what changed. The page shows it, ``batch.json`` has it all."""
 
 from __future__ import annotations
 
@@ -273,6 +273,43 @@ class MemoryUse(Record):
 
 
 @dataclass(frozen=True)
+class Change(Record):
+    """What two groups of logs of a vessel differ in, as ``ferryid diagnose --versus`` finds it.
+
+    Attributes
+    ----------
+    vessel
+        Its name.
+    before, after
+        Names of the logs, in their order.
+    chosen
+        How they were chosen, in words.
+    verdict, summary, differences
+        As in ``ferryid.versus/1``: whether they differ, one line, and a sentence for each difference; None and empty where
+        they could not be compared.
+    report
+        Path of the page, relative to the folder of the batch.
+    problem
+        Why they could not be compared; empty where they were.
+    """
+
+    vessel: str
+    before: tuple[str, ...]
+    after: tuple[str, ...]
+    chosen: str
+    verdict: str | None = None
+    summary: str = ""
+    differences: tuple[str, ...] = ()
+    report: str | None = None
+    problem: str = ""
+
+    @property
+    def sentence(self) -> str:
+        """Which logs, and what came of it."""
+        return f"{self.vessel}, {self.chosen}: {self.problem or self.summary}"
+
+
+@dataclass(frozen=True)
 class BatchResult(Record):
     """Schema ``ferryid.batch/1``.
 
@@ -288,8 +325,8 @@ class BatchResult(Record):
         Of the processes.
     folder, summary, page
         Where all of it lies, and the paths of table and page.
-    rows, trends
-        Of the logs, and over them.
+    rows, trends, changes
+        Of the logs, over them, and between the first and the last of them.
     seconds
         Time of the batch [s].
     """
@@ -304,4 +341,5 @@ class BatchResult(Record):
     page: str
     rows: tuple[SummaryRow, ...]
     trends: tuple[Trend, ...]
+    changes: tuple[Change, ...]
     seconds: float

@@ -7,7 +7,7 @@ from typing import Any
 from ferryid.batch.log_result import LogResult
 from ferryid.batch.logs import Entry
 from ferryid.batch.summary import summary_row
-from ferryid.report.batch_rows import BatchResult, MemoryUse, SummaryRow, Trend
+from ferryid.report.batch_rows import BatchResult, Change, MemoryUse, SummaryRow, Trend
 from ferryid.types import AXES
 
 
@@ -57,7 +57,9 @@ def finding(
     return {"effect": effect, "instance": instance, "probability": probability, "parameters": parameters, "says": says}
 
 
-def result(*rows: SummaryRow, trends: tuple[Trend, ...] = (), model: str = "") -> BatchResult:
+def result(
+    *rows: SummaryRow, trends: tuple[Trend, ...] = (), changes: tuple[Change, ...] = (), model: str = ""
+) -> BatchResult:
     """Return the result of a batch with these rows."""
     statuses = ("done", "partly", "refused", "failed", "memory", "lost")
     return BatchResult(
@@ -70,5 +72,5 @@ def result(*rows: SummaryRow, trends: tuple[Trend, ...] = (), model: str = "") -
         recipe={"steps": ["fit", "evaluate", "diagnose"], "model": model},
         memory=MemoryUse(4 << 30, True, 3 << 28),
         folder="out/batch", summary="out/batch/summary.parquet", page="out/batch/index.html", seconds=1.0,
-        rows=rows, trends=trends,
+        rows=rows, trends=trends, changes=changes,
     )  # fmt: skip

@@ -10,7 +10,10 @@ from pathlib import Path
 import pytest
 
 from ferryid import api
+from ferryid.batch.changes import GroupTask, compare_groups_of
+from ferryid.report.batch_rows import Change
 from ferryid.simulate import parse_scenario, simulate, write_log
+from ferryid.vessel import load_profile
 from tests.cli.test_diagnose_input import refused
 from tests.cli.test_every_command import conforms
 from tests.command_line.in_process import Run
@@ -54,6 +57,16 @@ def test_two_groups_and_several_logs_after_one_option(ferryid: Command, tmp_path
     again = api.compare_groups(logs[:2], logs[2:], "milliampere", tmp_path / "api")
     assert {**again.json, "report": ""} == {**json.loads(run.out), "report": ""}
     assert weak["says"] in again.text
+    # So does a batch of them, whose ingested tables are there.
+    profile = load_profile("milliampere")
+    change = Change(profile.name, ("bag1", "bag2"), ("bag3", "bag4"), "the last 2 logs against the first 2")
+    paths = [tuple(map(str, one)) for one in (logs[:2], logs[2:])]
+    folder = tmp_path / "api" / "batch" / "changes" / "x"
+    task = GroupTask(*paths, change, folder, tmp_path / "api", profile.text, profile.path, None, (), (), 4 << 30)
+    done = compare_groups_of(task)
+    assert (done.verdict, done.summary) == (found["verdict"], found["summary"])
+    assert weak["says"] in done.differences
+    assert (tmp_path / "api" / "batch" / str(done.report)).is_file()
 
 
 @pytest.mark.parametrize(
