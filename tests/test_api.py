@@ -63,6 +63,17 @@ def test_from_a_log_to_a_comparison(tmp_path: Path) -> None:
     api.fit([SHORT], load_profile("milliampere"), FitSettings(window_s=2.0), tmp_path)
     compared = api.compare(["milliampere@1", "milliampere@2"], SHORT, tmp_path)
     assert compared.report.exists()
+    # Results as tables: what the model file has, and what the page shows.
+    tables = fitted.tables
+    assert {"coefficients", "scores", "free_runs", "checks", "logs"} <= set(tables)
+    model = fitted.stored.model
+    yaw = tables["coefficients"].query("axis == 'yaw'").set_index("term")
+    assert yaw.loc[list(model.terms), "low"].tolist() == model.low[:, 2].tolist()
+    assert tables["scores"]["mse_model"].tolist() == list(fitted.json["scores"]["mse"]["model"].values())
+    assert set(compared.tables) >= {"ratios", "coefficients", "models"}
+    assert api.evaluate("milliampere", [SHORT], tmp_path).tables["scores"]["log"].tolist() == ["short"] * 3
+    assert api.models(tmp_path).tables["models"]["version"].tolist() == [1, 2]
+    assert set(fitted.figures) == {one.stem for one in fitted.report.parent.glob("*.svg")}
 
 
 def test_a_notebook_shows_the_page_or_the_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

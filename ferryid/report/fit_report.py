@@ -5,19 +5,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ferryid.files import alone
 from ferryid.identify import FitOutcome, FitSettings, fit_archive, fit_logs
+from ferryid.models import model_to_json
 from ferryid.models.store import StoredModel, assign_version, plan, save
 from ferryid.report.folder import PAGE, write_folder
 from ferryid.report.model_text import describe_settings
 from ferryid.report.outcome import Report
 from ferryid.report.page import headline, render
+from ferryid.report.tables import tables_of
 from ferryid.types import AXES, RunContext
 from ferryid.vessel.profile import Profile
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True)
@@ -30,6 +35,11 @@ class FitReport(Report):
     def accepted(self) -> bool:
         """Verdict of the fit."""
         return self.stored.model.accepted
+
+    @property
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Those of the result, and the ``coefficients`` of the model with their intervals."""
+        return {**tables_of(model_to_json(self.stored.model)), **super().tables}
 
 
 def fit_and_report(

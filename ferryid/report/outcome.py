@@ -5,7 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 LARGEST_SHOWN = 8 << 20
 """A page beyond this many bytes is linked in a notebook, not shown: the notebook would keep all of it."""
@@ -26,6 +29,13 @@ class Outcome:
     json: dict[str, Any]
     text: str
 
+    @property
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """The result as pandas tables by name, such as ``findings`` and ``errors``: see `ferryid.report.tables.tables_of`."""
+        from ferryid.report.tables import tables_of
+
+        return tables_of(self.json)
+
     def __str__(self) -> str:
         return self.text
 
@@ -38,6 +48,11 @@ class Report(Outcome):
     """A result with a page, which a notebook shows in its place."""
 
     report: Path
+
+    @property
+    def figures(self) -> dict[str, Path]:
+        """Paths of the figures (SVG) beside the page, by name."""
+        return {path.stem: path for path in sorted(self.report.parent.glob("*.svg"))}
 
     def _repr_html_(self) -> str:
         if self.report.stat().st_size > LARGEST_SHOWN:

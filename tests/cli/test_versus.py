@@ -57,6 +57,7 @@ def test_two_groups_and_several_logs_after_one_option(ferryid: Command, tmp_path
     again = api.compare_groups(logs[:2], logs[2:], "milliampere", tmp_path / "api")
     assert {**again.json, "report": ""} == {**json.loads(run.out), "report": ""}
     assert weak["says"] in again.text
+    assert again.tables["differences"].query("confirmed")["value"].tolist() == [weak["parameters"]["factor"]["value"]]
     # So does a batch of them, whose ingested tables are there.
     profile = load_profile("milliampere")
     change = Change(profile.name, ("bag1", "bag2"), ("bag3", "bag4"), "the last 2 logs against the first 2")
