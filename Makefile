@@ -7,7 +7,7 @@ VENV ?= .venv
 BIN = $(VENV)/bin
 DEMO ?= ferryid-out
 
-.PHONY: quick test docs evidence size demo picture bench attack faults real campaign rivals thesis proof proof-real wavy fixtures wheel-check lint clean
+.PHONY: quick test docs evidence size demo picture bench attack faults real campaign rivals plans thesis proof proof-real wavy fixtures wheel-check lint clean
 
 # On two cores: a worker takes a slow test at a time and the rest by files, so that the fixtures of a file are made once.
 SPREAD = -n 2 --dist loadgroup --no-loadscope-reorder
@@ -71,6 +71,11 @@ campaign: $(VENV)/installed
 TRIALS ?= 5
 rivals: $(VENV)/installed
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.rivals --trials $(TRIALS)
+
+# Planned trials against the usual one on VESSELS simulated vessels: writes reports/plan.md.
+VESSELS ?= 20
+plans: $(VENV)/installed
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.plans --vessels $(VESSELS)
 
 # The thesis's trials, flown again: writes reports/thesis.md and its figures.
 thesis: $(VENV)/installed

@@ -44,6 +44,7 @@ __all__ = [
     "inspect",
     "models",
     "new_vessel",
+    "plan",
     "promote",
     "prove",
     "reproduce",
@@ -645,6 +646,69 @@ def check_vessel(file: str | Path, *, identifiable: bool = False, progress: Prog
 
     found = study(_profile(file), progress)
     return _outcome({**result, "identifiability": as_json(found)}, f"{text}\n\n{as_text(found)}")
+
+
+def plan(
+    vessel: str | Path | Profile | None = None,
+    after: Logs = (),
+    out: str | Path = OUT,
+    *,
+    model: str | None = None,
+    minutes: float = 12.0,
+    area: tuple[float, float] | None = None,
+    separate: Sequence[tuple[str, str]] = (),
+    origin: tuple[float, float] | None = None,
+    bearing_deg: float = 0.0,
+    seed: int = 1,
+    overwrite: bool = False,
+    verify: bool = False,
+    ranges: Ranges = (),
+    progress: Progress = _quiet,
+    announce: Progress = _quiet,
+) -> Outcome:
+    """Design the trial that would tell most about a vessel, and write it to ``plans/<vessel>`` of the output folder.
+
+    Parameters
+    ----------
+    vessel
+        Its profile; that of `model`, or found by the recordings, where None.
+    after
+        What was recorded already: what it tells of the hull counts, and effects that it cannot separate are to be separated.
+    model
+        The diagnosed model that brings the hull: path, name or name@version; the profile's hull where None.
+    minutes
+        Longest time of the trial.
+    area
+        Length and breadth of the water there is [m].
+    separate
+        Further pairs of effects to separate, as ``("wind", "current")`` or ``("thruster_gain(bow)", "fouling")``.
+    origin, bearing_deg
+        Latitude and longitude of the middle of the area [deg], for a mission; bearing of its longer side from north [deg].
+    seed
+        Of the simulated noise.
+    overwrite
+        Replace an earlier plan.
+    """
+    from ferryid.errors import FerryIdError
+    from ferryid.planning import PlanSettings
+    from ferryid.report.plan_report import plan_and_report
+    from ferryid.vessel import parse_profile
+
+    paths = _paths(after)
+    known = _model(model, Path(out)) if model else None
+    if known is not None and vessel is None:
+        profile = _for_model(known, paths, None, announce) or parse_profile(known.profile_text, known.name)
+    elif vessel is None and not paths:
+        raise FerryIdError("--vessel: a plan is of a vessel, found none. Fix: give --vessel PROFILE, or --after LOG")
+    else:
+        profile = _chosen(paths, vessel, announce) if paths else _profile(vessel or "")
+    settings = PlanSettings(minutes, area, tuple(separate), known, seed)
+    outcome = plan_and_report(
+        profile, paths, settings, _context(out, progress, verify, ranges),
+        origin=origin, bearing_deg=bearing_deg, overwrite=overwrite,
+    )  # fmt: skip
+    progress("")
+    return outcome
 
 
 def new_vessel(

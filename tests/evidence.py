@@ -23,6 +23,7 @@ MAKERS: Mapping[str, tuple[str, ...]] = {
     "reports/benchmarks.md": ("tests/bench",),
     "reports/campaign.md": ("tests/real",),
     "reports/demo/forces.svg": ("cli/cmd_simulate.py", "cli/cmd_fit.py"),
+    "reports/plan.md": ("tests/plans",),
     "reports/proof.md": ("cli/cmd_prove.py",),
     "reports/proof-real.md": ("cli/cmd_prove.py",),
     "reports/real.md": ("tests/real",),

@@ -36,6 +36,7 @@ ORDER = (
     "diagnose",
     "simulate",
     "identifiability",
+    "planning",
     "report",
     "export",
     "reproduce",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
 
@@ -66,21 +67,31 @@ def usual_trial(profile: Profile) -> Trial:
             f"{profile.path}: effects are distinguished by motion and the actuators' force, found no actuator in the profile. "
             "Fix: describe them in [[actuator]] and map their signals"
         )
-    vessel = _sailing(profile)
+    vessel = sailing(profile)
     length, time = dimensions(profile)[0] / MODEL[0], froude_seconds(profile, 1.0)
     lines = ['schema = "ferryid.scenario/1"', f"vessel = {json.dumps(profile.name)}", "seed = 1"]
     corners = pushes_every_way(profile.actuators)
     if corners:
         lines += ["[path]", 'kind = "twelve-corner"', f"dwell_s = {60.0 * time!r}", f"size = {length!r}"]
-        lines += _controller(profile, length, time)
+        lines += controller_lines(profile, length, time)
     else:
-        lines += ["[manoeuvre]", 'kind = "zigzag"', f"speed_rpm = {_cruising(vessel)!r}", f"lead_s = {40.0 * time!r}"]
+        lines += ["[manoeuvre]", 'kind = "zigzag"', f"speed_rpm = {cruising(vessel)!r}", f"lead_s = {40.0 * time!r}"]
         lines += [f"duration_s = {720.0 * time!r}"]
-    dynamics, noise, fastest = Thrusters(), Noise(), max(_fastest(vessel), 1e-3)
-    lines += [
+    lines += equipment_lines(vessel, length, time)
+    what = "the twelve-corner trial" if corners else "a 20/20 zigzag"
+    generic = "a generic hull of its dimensions, as the profile has no hull model"
+    hull = "the profile's hull" if profile.hull.has_model else generic
+    says = f"Simulated: {what} of {profile.name} at its scale, in calm water and air, with {hull}."
+    return Trial(parse_scenario("\n".join(lines) + "\n", "usual-trial"), vessel, says)
+
+
+def equipment_lines(vessel: Profile, length: float, time: float) -> list[str]:
+    """Return the sections of a scenario on actuators and sensors, scaled in length and time from those of milliAmpère."""
+    dynamics, noise, full = Thrusters(), Noise(), max(fastest(vessel), 1e-3)
+    return [
         "[thrusters]",
         f"speed_lag_s = {dynamics.speed_lag_s * time!r}",
-        f"speed_rate_rpmps = {fastest / (1.75 * time)!r}",
+        f"speed_rate_rpmps = {full / (1.75 * time)!r}",
         f"azimuth_lag_s = {dynamics.azimuth_lag_s * time!r}",
         f"azimuth_rate_degps = {dynamics.azimuth_rate_degps / time!r}",
         f"rudder_lag_s = {dynamics.rudder_lag_s * time!r}",
@@ -88,15 +99,10 @@ def usual_trial(profile: Profile) -> Trial:
         "[sensors]",
         *("imu_rate_hz = 0", "camera_rate_hz = 0", "wind_rate_hz = 5", "current_rate_hz = 5", "payload_rate_hz = 1"),
         "[sensors.noise]",
-        f"speed_rpm = {1e-3 * fastest!r}",
+        f"speed_rpm = {1e-3 * full!r}",
         f"current_mps = {noise.current_mps * length / time!r}",
-        f"payload_kg = {noise.payload_kg * profile.hull.mass_kg / MODEL[1]!r}",
+        f"payload_kg = {noise.payload_kg * vessel.hull.mass_kg / MODEL[1]!r}",
     ]
-    what = "the twelve-corner trial" if corners else "a 20/20 zigzag"
-    generic = "a generic hull of its dimensions, as the profile has no hull model"
-    hull = "the profile's hull" if profile.hull.has_model else generic
-    says = f"Simulated: {what} of {profile.name} at its scale, in calm water and air, with {hull}."
-    return Trial(parse_scenario("\n".join(lines) + "\n", "usual-trial"), vessel, says)
 
 
 def generic_hull(profile: Profile) -> Hull:
@@ -109,7 +115,7 @@ def generic_hull(profile: Profile) -> Hull:
     return replace(profile.hull, M=M, D=D)
 
 
-def _sailing(profile: Profile) -> Profile:
+def sailing(profile: Profile) -> Profile:
     """Return the vessel as it can be simulated: with a hull model, and thrust curves that end."""
     hull = profile.hull if profile.hull.has_model else generic_hull(profile)
     strongest = STRONGEST * profile.hull.mass_kg
@@ -134,7 +140,7 @@ def _ended(actuator: Actuator, strongest: float) -> Actuator:
     return replace(actuator, thrust=replace(curve, valid=(max(curve.valid[0], -end), min(curve.valid[1], end))))
 
 
-def _fastest(vessel: Profile) -> float:
+def fastest(vessel: Profile) -> float:
     """Return the highest speed [rpm] of all propellers; of forces that are ordered directly, a usual one [N]."""
     curves = curves_of(vessel)
     return max(
@@ -143,7 +149,7 @@ def _fastest(vessel: Profile) -> float:
     )
 
 
-def _cruising(vessel: Profile) -> float:
+def cruising(vessel: Profile) -> float:
     """Return the speed [rpm], or the force [N], that drives the vessel through a zigzag."""
     curves, count = curves_of(vessel), len(vessel.actuators)
     share = CRUISING * vessel.hull.mass_kg / count
@@ -152,8 +158,27 @@ def _cruising(vessel: Profile) -> float:
     )
 
 
-def _controller(profile: Profile, length: float, time: float) -> list[str]:
-    """Return gains and reference of the controller, scaled from the simulator's."""
+def controller_lines(
+    profile: Profile,
+    length: float,
+    time: float,
+    quick: float = 1.0,
+    most: Sequence[float] | None = None,
+    hardest: Sequence[float] | None = None,
+) -> list[str]:
+    """Return gains and reference of the controller, scaled from the simulator's.
+
+    Parameters
+    ----------
+    profile
+        The vessel.
+    length, time
+        Factors from those of milliAmpère.
+    quick
+        Factor on the natural frequency of the reference: how closely it follows what is asked for.
+    most, hardest
+        Largest speeds [m/s, m/s, rad/s] and accelerations; scaled from the simulator's where None.
+    """
     gains, reference = Gains(), ReferenceTuning()
     mass, inertia = profile.hull.mass_kg / MODEL[1], profile.hull.inertia_z / MODEL[2]
     by_axis = (mass, mass, inertia)
@@ -165,6 +190,8 @@ def _controller(profile: Profile, length: float, time: float) -> list[str]:
         return (mass * time**power, mass * time**power, inertia * time**power)
 
     speed, turn = length / time, 1.0 / time
+    limits = scaled(reference.speed_limit, (speed, speed, turn)) if most is None else repr(list(most))
+    pushes = scaled(reference.acceleration_limit, (speed / time, speed / time, turn / time))
     return [
         "[controller]",
         f"Kp = {scaled(gains.Kp, each(-2))}",
@@ -172,7 +199,7 @@ def _controller(profile: Profile, length: float, time: float) -> list[str]:
         f"Ki = {scaled(gains.Ki, each(-3))}",
         f"integral_limit = {scaled(gains.integral_limit, (by_axis[0], by_axis[1], by_axis[2] / time**2))}",
         "[controller.reference]",
-        f"omega_radps = {scaled(reference.omega_radps, (turn, turn, turn))}",
-        f"speed_limit = {scaled(reference.speed_limit, (speed, speed, turn))}",
-        f"acceleration_limit = {scaled(reference.acceleration_limit, (speed / time, speed / time, turn / time))}",
+        f"omega_radps = {scaled(reference.omega_radps, (quick * turn, quick * turn, quick * turn))}",
+        f"speed_limit = {limits}",
+        f"acceleration_limit = {pushes if hardest is None else repr(list(hardest))}",
     ]

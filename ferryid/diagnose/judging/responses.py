@@ -86,6 +86,17 @@ def responses(problem: EstimationProblem, base: Fit, candidates: Sequence[Candid
     candidates
         The effects; those of `candidates_of` where None.
     """
+    found, every = response_columns(problem, base, candidates)
+    return replace(found, products=every.T @ every)
+
+
+def response_columns(
+    problem: EstimationProblem, base: Fit, candidates: Sequence[Candidate] | None = None
+) -> tuple[Responses, Floats]:
+    """Return the same without its products, and the responses themselves, shape (w, 26 + q): those of any rows add up.
+
+    Rows are the steps of the filter, each with its channels one after the other.
+    """
     force_model = fitted_force_model(problem.plain, base)
     columns, parameters = [problem.hull_slopes(force_model)], list[tuple[Key, str]]()
     titles, errors = dict[Key, str](), dict[Key, float]()
@@ -97,9 +108,9 @@ def responses(problem: EstimationProblem, base: Fit, candidates: Sequence[Candid
         parameters += [(candidate.key, name) for name in names]
         titles[candidate.key] = titled(candidate.effect.title, candidate.instance)
         errors[candidate.key] = candidate.effect.formula_error
-    every = np.column_stack(columns)
     setting = problem.plain.measurements.profile.setting
-    return Responses(titles, errors, tuple(parameters), problem.hull_spread, every.T @ every, setting)
+    found = Responses(titles, errors, tuple(parameters), problem.hull_spread, np.zeros((0, 0)), setting)
+    return found, np.column_stack(columns)
 
 
 def _response(problem: EstimationProblem, force_model: ForceModel, candidate: Candidate) -> tuple[list[str], Floats]:

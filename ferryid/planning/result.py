@@ -1,0 +1,123 @@
+"""A plan as text and as JSON."""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import Any
+
+from ferryid.counts import counted
+from ferryid.diagnose.judging import Key
+from ferryid.effects import effects
+from ferryid.effects.wording import titled
+from ferryid.planning.plan import Expected, Plan, Separated, Track
+
+SCHEMA = "ferryid.plan/1"
+
+
+def as_json(plan: Plan) -> dict[str, Any]:
+    """Return a plan as ``ferryid.plan/1``, without the files that were written."""
+    return {
+        "schema": SCHEMA,
+        "vessel": plan.vessel.name,
+        "duration_s": plan.duration_s,
+        "path": None if plan.track is None else _track_json(plan.track),
+        "drawn": plan.drawn,
+        "after": list(plan.after),
+        "manoeuvres": [
+            {
+                "kind": one.kind,
+                "says": one.says,
+                "begin_s": one.begin_s,
+                "end_s": one.end_s,
+                "gain": one.gain,
+            }
+            for one in plan.chosen
+        ],
+        "usual": plan.usual,
+        "ratio": plan.ratio if isfinite(plan.ratio) else None,
+        "coefficients": [
+            {
+                "coefficient": one.name,
+                "unit": one.unit,
+                "value": one.value,
+                "deviation": {"now": one.now, "usual": one.usual, "planned": one.planned},
+            }
+            for one in plan.hull
+        ],
+        "pairs": [
+            {
+                "effects": [{"effect": effect, "instance": instance} for effect, instance in (one.first, one.second)],
+                "separated_from": {"now": one.now, "usual": one.usual, "planned": one.planned},
+            }
+            for one in plan.pairs
+        ],
+    }
+
+
+def _track_json(track: Track) -> dict[str, Any]:
+    speed, acceleration = track.limits.speed, track.limits.acceleration
+    return {
+        "area_m": list(track.area),
+        "step_s": track.step_s,
+        "speed": {"surge_mps": speed[0], "sway_mps": speed[1], "yaw_radps": speed[2]},
+        "acceleration": {"surge_mps2": acceleration[0], "sway_mps2": acceleration[1], "yaw_radps2": acceleration[2]},
+    }
+
+
+def as_text(plan: Plan) -> str:
+    """Return a plan as a terminal shows it."""
+    within = ""
+    if plan.track is not None:
+        within = f", within {max(plan.track.area):.0f} x {min(plan.track.area):.0f} m"
+    count = counted(len(plan.chosen), "manoeuvre")
+    lines = [f"{plan.vessel.name}: {count} in {plan.duration_s / 60.0:.1f} min{within}, chosen of {plan.drawn}"]
+    if plan.track is not None:
+        u, v, r = plan.track.limits.speed
+        lines.append(f"speeds up to {u:.2g} m/s ahead, {v:.2g} m/s sideways, {r:.2g} rad/s of turn")
+    lines += [
+        "",
+        *(f"  {_clock(one.begin_s)}  {one.says}" for one in plan.chosen),
+        "",
+        summary(plan),
+        "",
+        f"{'coefficient':<12}{'value':>12}{'now':>10}{'usual':>10}{'planned':>10}  unit (standard deviations expected)",
+        *(_line(one) for one in plan.hull),
+    ]
+    if plan.pairs:
+        lines += ["", "Effects that look alike, and from how many times their usual size they separate:"]
+        lines += [f"  {_pair(one)}" for one in plan.pairs]
+    return "\n".join(lines)
+
+
+def summary(plan: Plan) -> str:
+    """Return what the plan is expected to gain, in a sentence."""
+    already = f", beside {counted(len(plan.after), 'log')} recorded already" if plan.after else ""
+    return (
+        f"Expected standard deviations of the hull's coefficients: {plan.ratio:.2f} of those after {plan.usual}, "
+        f"in the median of {len(plan.hull)}{already}. They are for the noise of the simulator's sensors: "
+        "they compare trials, and a recording will show larger ones."
+    )
+
+
+def _line(one: Expected) -> str:
+    return f"{one.name:<12}{one.value:>12.4g}{one.now:>10.3g}{one.usual:>10.3g}{one.planned:>10.3g}  {one.unit}"
+
+
+def _pair(one: Separated) -> str:
+    sizes = [
+        f"{name} {_size(size)}" for name, size in (("now", one.now), ("usual", one.usual), ("planned", one.planned))
+    ]
+    return f"{_title(one.first)} and {_title(one.second)}: {', '.join(sizes)}"
+
+
+def _size(size: float | None) -> str:
+    return "not" if size is None else f"{size:.2g}"
+
+
+def _title(key: Key) -> str:
+    title = titled(effects()[key[0]].title, key[1])
+    return title[:1].lower() + title[1:]
+
+
+def _clock(seconds: float) -> str:
+    return f"{int(seconds // 60):2d}:{int(seconds % 60):02d}"

@@ -1,0 +1,41 @@
+"""A planned trial with its files: what ``ferryid plan`` leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from ferryid.planning import PlanSettings, as_json, as_text, check_place, plan, write_plan
+from ferryid.report.outcome import Outcome
+from ferryid.report.plan_figures import picture
+from ferryid.types import RunContext
+from ferryid.vessel.profile import Profile
+
+
+def plan_and_report(
+    profile: Profile,
+    logs: Sequence[str],
+    settings: PlanSettings,
+    run: RunContext,
+    *,
+    origin: tuple[float, float] | None = None,
+    bearing_deg: float = 0.0,
+    overwrite: bool = False,
+) -> Outcome:
+    """Plan a trial and write its files to ``plans/<vessel>`` of the output folder.
+
+    Parameters
+    ----------
+    profile, logs, settings, run
+        As of `ferryid.planning.plan.plan`.
+    origin, bearing_deg, overwrite
+        As of `ferryid.planning.waypoints.write_plan`.
+    """
+    folder = Path(run.out) / "plans" / profile.name
+    check_place(folder, origin, overwrite=overwrite)
+    found = plan(profile, logs, settings, run)
+    run.progress("writing the plan")
+    told = write_plan(
+        found, folder, as_json(found), picture(found), origin=origin, bearing_deg=bearing_deg, overwrite=overwrite
+    )
+    return Outcome(told, "\n".join([as_text(found), "", *(f"wrote {file}" for file in told["files"])]))

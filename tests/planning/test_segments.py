@@ -1,0 +1,66 @@
+"""Manoeuvres of a plan: within the room, the speeds and the accelerations there are, from rest to rest in the middle."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import sqrt
+
+import numpy as np
+import pytest
+
+from ferryid.errors import FerryIdError
+from ferryid.identifiability.trial import sailing
+from ferryid.planning.limits import USED, Limits, limits_of
+from ferryid.planning.segments import STEP_S, segments
+from ferryid.simulate.plant.thrust import curves_of, largest_force
+from ferryid.vessel import load_profile
+
+LIMITS = Limits((2.0, 1.2, 0.4), (0.3, 0.2, 0.1), 27.5, 17.5)
+
+
+@pytest.mark.parametrize("time", [1.0, 2.5])
+def test_manoeuvres_begin_and_end_at_rest_in_the_middle_and_keep_within_the_limits(time: float) -> None:
+    step = STEP_S * time
+    for one in segments(LIMITS, time):
+        north, east, heading = one.poses.T
+        assert np.allclose(one.poses[[0, -1], :2], 0.0, atol=1e-6), one.says
+        assert np.allclose(one.poses[-1], one.poses[-2]), one.says
+        turns = heading[-1] / (2.0 * np.pi)
+        assert turns == pytest.approx(round(turns), abs=1e-6), one.says
+        assert np.abs(north).max() <= LIMITS.long + 1e-6, one.says
+        assert np.abs(east).max() <= LIMITS.wide + 1e-6, one.says
+        speed = np.diff(one.poses, axis=0) / step
+        assert np.hypot(speed[:, 0], speed[:, 1]).max() <= LIMITS.speed[0] * 1.001, one.says
+        assert np.abs(speed[:, 2]).max() <= LIMITS.speed[2] * 1.001, one.says
+        assert np.abs(np.diff(speed[:, 2])).max() / step <= LIMITS.acceleration[2] * 1.05, one.says
+
+
+def test_every_axis_is_moved_by_itself_and_with_the_others() -> None:
+    found = segments(LIMITS, 1.0)
+    moved = {tuple((np.ptp(one.poses, axis=0) > 1e-6).tolist()) for one in found}
+    assert {(True, False, False), (False, True, False), (False, False, True), (True, True, True)} <= moved
+    assert len({one.says for one in found}) == len(found)
+
+
+def test_speeds_are_those_at_which_damping_takes_the_force() -> None:
+    vessel = sailing(load_profile("milliampere"))
+    limits = limits_of(vessel, (60.0, 40.0))
+    curves = curves_of(vessel)
+    force = USED * sum(largest_force(curves, k, True) for k in range(len(vessel.actuators)))
+    assert limits.acceleration[0] == pytest.approx(force / vessel.hull.M[0, 0])
+    # A hull with quadratic damping alone: force = d u^2.
+    hull = replace(vessel.hull, D={"X_|u|u": -400.0, "Y_|v|v": -800.0, "N_|r|r": -9e9})
+    plain = limits_of(replace(vessel, hull=hull), (60.0, 40.0))
+    assert plain.speed[0] == pytest.approx(sqrt(force / 400.0))
+    assert plain.speed[1] == pytest.approx(sqrt(force / 800.0))
+
+
+def test_room_is_half_the_sides_less_half_a_length() -> None:
+    vessel = sailing(load_profile("milliampere"))
+    for area in ((60.0, 40.0), (40.0, 60.0)):
+        limits = limits_of(vessel, area)
+        assert (limits.long, limits.wide) == (0.5 * (60.0 - vessel.hull.length_m), 0.5 * (40.0 - vessel.hull.length_m))
+    with pytest.raises(
+        FerryIdError, match=r"--area: 10x40 m has no room for the turning circle .* Fix: give at least 15x15"
+    ):
+        limits_of(vessel, (10.0, 40.0))

@@ -1,0 +1,92 @@
+"""Planned trials against the usual one, on simulated vessels whose hull is off from what the plan believes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from ferryid.diagnose.data import read_measurements, window_lengths
+from ferryid.diagnose.inference import estimation_problem, fit, fitted_force_model, prior_force_model, windows
+from ferryid.effects.force_model import hull_of
+from ferryid.effects.thresholds import EFFECTS
+from ferryid.identifiability.sensors import mapped, reading
+from ferryid.identifiability.trial import sailing
+from ferryid.planning import PlanSettings, plan
+from ferryid.planning.waters import Waters
+from ferryid.simulate import Scenario, write_log
+from ferryid.simulate.sensors import sense
+from ferryid.simulate.trial import Simulation, sail
+from ferryid.types import IN_MEMORY
+from ferryid.vessel import load_profile
+from ferryid.vessel.profile import Profile
+
+VESSELS = ("milliampere", "milliampere-2025")
+"""Bundled vessels with a hull model that can follow a path."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """What came of one vessel.
+
+    Attributes
+    ----------
+    vessel
+        Its profile.
+    usual, planned
+        Median error of the hull's coefficients after either trial, over their prior standard deviations.
+    expected
+        Median ratio of the deviations that the plan expected.
+    """
+
+    vessel: str
+    usual: float
+    planned: float
+    expected: float
+
+
+def study(number: int) -> Found:
+    """Return what came of a vessel: a bundled one with every coefficient off as the prior has it, by a seed."""
+    profile = load_profile(VESSELS[number % len(VESSELS)])
+    rng = np.random.default_rng(1000 + number)
+    true = _off(sailing(profile), rng)
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        waters = Waters(profile, sailing(profile), frozenset(), folder, 2 * number + 1)
+        made = plan(profile, (), PlanSettings(seed=2 * number + 1), IN_MEMORY)
+        assert made.track is not None
+        usual = _log(waters.twelve_corners(made.duration_s), profile, true, 2 * number + 1, folder / "usual.mcap")
+        planned = _log(made.track.scenario, profile, true, 2 * number + 2, folder / "planned.mcap")
+        errors = [_error(log, profile, true) for log in (usual, planned)]
+    return Found(profile.name, *errors, made.ratio)
+
+
+def _off(vessel: Profile, rng: np.random.Generator) -> Profile:
+    spread = EFFECTS.hull_spread
+    M = vessel.hull.M.copy()
+    for k in range(3):
+        M[k, k] *= 1.0 + spread * rng.standard_normal()
+    D = {name: value * (1.0 + spread * rng.standard_normal()) for name, value in vessel.hull.D.items()}
+    return replace(vessel, hull=replace(vessel.hull, M=M, D=D))
+
+
+def _log(scenario: Scenario, profile: Profile, true: Profile, seed: int, path: Path) -> Path:
+    truth, control = sail(scenario, sailing(profile), seed, None, true)
+    streams = sense(scenario, true, seed, truth, control)
+    write_log(Simulation(scenario, seed, true, truth, control, streams), path)
+    return path
+
+
+def _seen(profile: Profile) -> Profile:
+    return replace(reading(sailing(profile), mapped(profile)), hull=profile.hull)
+
+
+def _error(log: Path, profile: Profile, true: Profile) -> float:
+    measurements, _ = read_measurements(str(log), _seen(profile))
+    seen = windows(measurements, *window_lengths(profile))
+    problem = estimation_problem(seen, *prior_force_model(seen.measurements, profile))
+    found = fitted_force_model(problem.plain, fit(problem, ())).hull
+    free = problem.hull_spread > 0.0
+    return float(np.median(np.abs(found - hull_of(true))[free] / problem.hull_spread[free]))
