@@ -159,8 +159,8 @@ def numeric_fields(topic: Topic) -> dict[str, tuple[str, ...]]:
     """Return the numbers of a topic with the words of their names."""
     found = {}
     for path, kind in topic.fields.items():
-        # In messages these are arrays, in tables units.
-        if kind.startswith(_NUMBERS) and (topic.encoding == "table" or not path.endswith("]")):
+        # Of most messages these are arrays.
+        if kind.startswith(_NUMBERS) and (topic.lists_elements or not path.endswith("]")):
             found[path] = words_of(path)
     return found
 

@@ -26,7 +26,7 @@ class Topic:
     type
         Message type (``"nav_msgs/msg/Odometry"``), or ``"table"``.
     encoding
-        ``"ros1"``, ``"cdr"``, ``"protobuf"``, ``"json"`` or ``"table"``.
+        ``"ros1"``, ``"cdr"``, ``"protobuf"``, ``"json"``, ``"ulog"``, ``"dataflash"`` or ``"table"``.
     count
         Number of messages (rows).
     start_ns, end_ns
@@ -34,7 +34,7 @@ class Topic:
     fields
         Leaf path to primitive type, in message order: ``{"pose.position.x": "float64"}``. Elements of arrays are
         addressed as ``name[3]``; a fixed array is listed once as ``name[36]`` with its length, a sequence
-        as ``name[]``. Empty when the definition could not be read.
+        as ``name[]``, where not `lists_elements`. Empty when the definition could not be read.
     note
         What a user must know of this topic (``"receive times only: no header"``), or an empty string.
     """
@@ -47,6 +47,11 @@ class Topic:
     end_ns: int | None
     fields: Mapping[str, str]
     note: str = ""
+
+    @property
+    def lists_elements(self) -> bool:
+        """True where every element of an array is a field of its own (``q[0]``, ``q[1]``), or there are no arrays."""
+        return self.encoding in ("table", "ulog", "dataflash")
 
 
 @dataclass(frozen=True)

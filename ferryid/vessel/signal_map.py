@@ -372,8 +372,8 @@ def _some(names: Sequence[str]) -> str:
 def _field_type(path: str, topic: Topic) -> str | None:
     """Return the type of a field, an element of an array included, or None where the topic has no such field."""
     fields = topic.fields
-    # In a message "name[3]" is listed for an array of three and asked for as its fourth element; a table has no arrays.
-    if topic.encoding == "table" or not path.endswith("]"):
+    # "name[3]" is listed for an array of three and asked for as its fourth element, but where elements are listed.
+    if topic.lists_elements or not path.endswith("]"):
         return fields.get(path)
     if "[" in path:
         name, _, index = path[:-1].rpartition("[")

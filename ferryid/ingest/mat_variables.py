@@ -1,0 +1,328 @@
+"""Variables of MAT files as arrays and structures: level 4 and 5 by SciPy, version 7.3 (HDF5) by h5py."""
+
+from __future__ import annotations
+
+import io
+import struct
+import warnings
+import zlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ferryid.errors import FerryIdError, one_line
+from ferryid.ingest.log import Column, Loss
+from ferryid.ingest.mat_tables import MOST_STRUCTS, Leaf, Node
+
+HDF5 = b"\x89HDF\r\n\x1a\n"
+_HEADER = 128
+_MATRIX, _COMPRESSED = 14, 15
+_LARGE_BYTES = 1 << 30
+_MOST_TIMES_LARGER = 100
+"""A variable of more than `_LARGE_BYTES` that needs this many times the size of its file is not read."""
+_DEEPEST = 12
+"""Structures in structures."""
+_FIGURE = ("hgS_", "hgM_", "hgO_")
+"""How the variables of a saved figure begin."""
+
+
+@dataclass
+class MatVariables:
+    """What a file holds.
+
+    Attributes
+    ----------
+    found
+        Name to array or structure.
+    objects
+        Name and class of MATLAB objects, of which a file has only what MATLAB itself can read.
+    figure
+        True where the file is a saved figure.
+    losses
+        Variables that cannot be read.
+    """
+
+    found: dict[str, Node] = field(default_factory=dict)
+    objects: dict[str, str] = field(default_factory=dict)
+    figure: bool = False
+    losses: list[Loss] = field(default_factory=list)
+
+
+def read_variables(path: Path) -> MatVariables:
+    """Read a MAT file of any version.
+
+    Raises
+    ------
+    FerryIdError
+        For a file that is none, is damaged from its beginning, or needs h5py where that is not installed.
+    """
+    with path.open("rb") as file:
+        head = file.read(_HEADER)
+        file.seek(512)
+        later = file.read(8)
+    if head.startswith(HDF5) or later == HDF5:
+        return _hdf5(path)
+    if head.startswith(b"MATLAB 7.3"):
+        raise FerryIdError(f"{path}: the MAT file ends within its head. Fix: copy it again, or save it again in MATLAB")
+    if head.startswith(b"# Created by Octave") or head.startswith(b"Octave-1-"):
+        raise FerryIdError(
+            f"{path}: a file in Octave's own format, found no MAT file. Fix: in Octave, save -v7 log.mat"
+        )
+    content = path.read_bytes()
+    return _level_5(path, content) if head.startswith(b"MATLAB") else _level_4(path, content)
+
+
+def _level_5(path: Path, content: bytes) -> MatVariables:
+    """Read variable after variable, so that one that is damaged does not cost the others."""
+    if len(content) < _HEADER:
+        raise FerryIdError(
+            f"{path}: the MAT file ends within its head of {_HEADER} bytes, found {len(content)}. "
+            "Fix: copy it again, or save it again in MATLAB"
+        )
+    order = ">" if content[126:128] == b"MI" else "<"
+    result = MatVariables()
+    position = _HEADER
+    while position < len(content):
+        if position + 8 > len(content):
+            result.losses.append(_lost(path, "the MAT file ends within a variable"))
+            break
+        kind, size = struct.unpack_from(f"{order}II", content, position)
+        after = position + 8 + size
+        if kind not in (_MATRIX, _COMPRESSED) or size == 0:
+            result.losses.append(_lost(path, f"what begins at byte {position} of the MAT file is no variable"))
+            break
+        if after > len(content):
+            result.losses.append(_lost(path, "the MAT file ends within a variable"))
+            break
+        try:
+            _add(result, _loaded(_unpacked(content, position, after, order), order, content[:_HEADER]))
+        except Exception as error:  # noqa: BLE001 - SciPy raises whatever a damaged file leads to
+            result.losses.append(
+                _lost(path, f"the variable at byte {position} of the MAT file cannot be read ({_reason(error)})")
+            )
+        position = after
+    return result
+
+
+def _level_4(path: Path, content: bytes) -> MatVariables:
+    """Read matrices of MATLAB 4, whose file has no head that would name it."""
+    import scipy.io
+
+    result = MatVariables()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            found = scipy.io.whosmat(io.BytesIO(content))
+            if any(np.prod(shape, dtype=float) > len(content) for _, shape, _ in found):
+                raise ValueError("a variable larger than the file")
+            _add(result, scipy.io.loadmat(io.BytesIO(content)))
+    except Exception as error:  # noqa: BLE001 - SciPy raises whatever a damaged file leads to
+        raise FerryIdError(
+            f"{path}: not a MAT file that can be read ({_reason(error)}). Fix: save it again in MATLAB, or copy it again"
+        ) from error
+    return result
+
+
+def _unpacked(content: bytes, position: int, after: int, order: str) -> bytes:
+    """Return a variable as it is without compression."""
+    (kind,) = struct.unpack_from(f"{order}I", content, position)
+    if kind == _MATRIX:
+        return content[position:after]
+    most = max(_LARGE_BYTES, _MOST_TIMES_LARGER * len(content))
+    stream = zlib.decompressobj()
+    plain = stream.decompress(content[position + 8 : after], most)
+    if stream.unconsumed_tail:
+        raise ValueError(f"it needs more than {most / 1e6:.0f} MB")
+    if not stream.eof:
+        raise ValueError("its end is missing")
+    return plain
+
+
+def _loaded(variable: bytes, order: str, header: bytes) -> Mapping[str, Any]:
+    import scipy.io
+
+    with warnings.catch_warnings():
+        # Names that are no names in Python, and functions that are not kept.
+        warnings.simplefilter("ignore")
+        found: Mapping[str, Any] = scipy.io.loadmat(io.BytesIO(header + variable), chars_as_strings=True)
+    return found
+
+
+def _add(result: MatVariables, found: Mapping[str, Any]) -> None:
+    for name, value in found.items():
+        if name.startswith("__"):
+            continue
+        if name.startswith(_FIGURE):
+            result.figure = True
+            continue
+        node = _node(value, name, result, 0)
+        if node is not None:
+            result.found[name] = node
+
+
+def _node(value: Any, path: str, result: MatVariables, depth: int) -> Node | None:
+    """Turn what SciPy returned into arrays and structures; None for what holds no numbers."""
+    from scipy.io.matlab import MatlabFunction, MatlabOpaque
+
+    if isinstance(value, MatlabFunction) or depth > _DEEPEST or not isinstance(value, np.ndarray):
+        return None
+    if isinstance(value, MatlabOpaque):
+        kind = value["s2"].flat[0] if "s2" in (value.dtype.names or ()) else ""
+        result.objects[path] = kind.decode("ascii", "replace") if isinstance(kind, bytes) else str(kind)
+        return None
+    if value.dtype.names:
+        return _structure(value, path, result, depth)
+    if value.dtype.kind == "O":
+        return _texts(value)
+    if value.dtype.kind == "U":
+        texts = np.array([str(value.flat[0]) if value.size == 1 else "".join(value.ravel().tolist())], object)
+        return Leaf((1,), "O", "string", lambda: texts)
+    if value.dtype.kind not in "fiub" or value.size == 0:
+        return None
+    array = _bare(value)
+    return Leaf(array.shape, array.dtype.kind, array.dtype.name, lambda: array)
+
+
+def _bare(value: np.ndarray[Any, Any]) -> Column:
+    """Return an array without axes of length one, in the byte order of the machine."""
+    array = value.astype(value.dtype.newbyteorder("="), copy=False).squeeze()
+    return array.reshape(1) if array.ndim == 0 else array
+
+
+def _structure(value: Any, path: str, result: MatVariables, depth: int) -> Node | None:
+    names = value.dtype.names
+    if value.size == 1:
+        inner = {name: _node(value[name].flat[0], f"{path}.{name}", result, depth + 1) for name in names}
+        return {name: node for name, node in inner.items() if node is not None} or None
+    columns: dict[str, Any] = {}
+    for name in names:
+        cells = list(value[name].flat)
+        if cells and all(isinstance(cell, np.ndarray) and cell.size == 1 and cell.dtype.kind in "fiub" for cell in cells):
+            numbers = np.array([cell.flat[0] for cell in cells])
+            columns[name] = Leaf(numbers.shape, numbers.dtype.kind, numbers.dtype.name, _constant(numbers))
+    if columns:
+        return columns
+    entries = (_node(one.reshape(1, 1), f"{path}[{k}]", result, depth + 1) for k, one in _few(value))
+    return {f"[{k}]": node for k, node in enumerate(entries) if node is not None} or None
+
+
+def _few(value: Any) -> list[tuple[int, Any]]:
+    flat = value.ravel()
+    return [(k, flat[k : k + 1]) for k in range(min(len(flat), MOST_STRUCTS))]
+
+
+def _constant(array: Column) -> Callable[[], Column]:
+    return lambda: array
+
+
+def _texts(value: Any) -> Leaf | None:
+    """Return a cell array of texts, None for cells of anything else."""
+    cells = list(value.flat)
+    if not cells or not all(isinstance(cell, np.ndarray) and cell.dtype.kind == "U" for cell in cells):
+        return None
+    texts = np.empty(len(cells), object)
+    texts[:] = [str(cell.flat[0]) if cell.size else "" for cell in cells]
+    return Leaf(texts.shape, "O", "string", lambda: texts)
+
+
+def _hdf5(path: Path) -> MatVariables:
+    try:
+        import h5py
+    except ImportError as error:
+        raise FerryIdError(
+            f"{path}: a MAT file of version 7.3, which needs h5py. Fix: pip install 'ferryid[matlab]', or in MATLAB "
+            "save('log.mat', ..., '-v7')"
+        ) from error
+    result = MatVariables()
+    try:
+        with h5py.File(path, "r") as file:
+            for name in file:
+                if name.startswith("#"):
+                    continue
+                if name.startswith(_FIGURE):
+                    result.figure = True
+                    continue
+                node = _hdf5_node(path, file, file[name], name, result, 0)
+                if node is not None:
+                    result.found[name] = node
+    except Exception as error:  # noqa: BLE001 - h5py raises whatever a damaged file leads to
+        raise FerryIdError(
+            f"{path}: the MAT file cannot be read ({_reason(error)}). Fix: copy it again, or save it again in MATLAB"
+        ) from error
+    return result
+
+
+def _hdf5_node(path: Path, file: Any, item: Any, name: str, result: MatVariables, depth: int) -> Node | None:
+    import h5py
+
+    kind = item.attrs.get("MATLAB_class", b"")
+    kind = kind.decode("ascii", "replace") if isinstance(kind, bytes) else str(kind)
+    if depth > _DEEPEST:
+        return None
+    if "MATLAB_object_decode" in item.attrs:
+        result.objects[name] = kind
+        return None
+    if isinstance(item, h5py.Group):
+        inner = {key: _hdf5_node(path, file, item[key], f"{name}.{key}", result, depth + 1) for key in item}
+        return _as_columns({key: node for key, node in inner.items() if node is not None})
+    if "MATLAB_empty" in item.attrs or not isinstance(item, h5py.Dataset):
+        return None
+    if item.dtype.kind == "O":
+        return _references(path, file, item, name, result, depth)
+    if kind == "char":
+        text = np.array(["".join(map(chr, np.asarray(item).T.ravel().tolist()))], object)
+        return Leaf((1,), "O", "string", lambda: text)
+    if item.dtype.kind not in "fiub" or item.size == 0:
+        return None
+    if item.size * item.dtype.itemsize > max(_LARGE_BYTES, _MOST_TIMES_LARGER * path.stat().st_size):
+        raise ValueError(f"{name} is larger than its file can hold")
+    # MATLAB counts axes from the other end.
+    shape = tuple(size for size in reversed(item.shape) if size != 1) or (1,)
+    dtype = np.dtype(bool) if kind == "logical" else item.dtype.newbyteorder("=")
+    return Leaf(shape, dtype.kind, dtype.name, _hdf5_loader(path, item.name, dtype))
+
+
+def _references(path: Path, file: Any, item: Any, name: str, result: MatVariables, depth: int) -> Node | None:
+    """Return what references lead to: entries of a structure array, or of a cell array, by number."""
+    targets = [file[one] for one in np.asarray(item).T.ravel()[:MOST_STRUCTS]]
+    nodes = [_hdf5_node(path, file, one, f"{name}[{k}]", result, depth + 1) for k, one in enumerate(targets)]
+    return {f"[{k}]": node for k, node in enumerate(nodes) if node is not None} or None
+
+
+def _as_columns(fields: dict[str, Any]) -> Node | None:
+    """Turn around a structure array, which HDF5 has as a structure of numbered entries."""
+    numbered = [key for key, node in fields.items() if isinstance(node, dict) and "[0]" in node]
+    if not fields or len(numbered) < len(fields):
+        return fields or None
+    entries: dict[str, dict[str, Any]] = {}
+    for key in numbered:
+        for place, node in fields[key].items():
+            entries.setdefault(place, {})[key] = node
+    return dict(entries)
+
+
+def _hdf5_loader(path: Path, inside: str, dtype: np.dtype[Any]) -> Callable[[], Column]:
+    def load() -> Column:
+        import h5py
+
+        try:
+            with h5py.File(path, "r") as file:
+                return _bare(np.asarray(file[inside]).T).astype(dtype, copy=False)
+        except Exception as error:
+            raise FerryIdError(
+                f"{path}: the variable {inside} of the MAT file cannot be read ({_reason(error)}). "
+                "Fix: copy it again, or save it again in MATLAB"
+            ) from error
+
+    return load
+
+
+def _lost(path: Path, what: str) -> Loss:
+    return Loss(str(path), what)
+
+
+def _reason(error: Exception) -> str:
+    return one_line(str(error) or type(error).__name__)[:200]
