@@ -143,14 +143,14 @@ def _gather(node: Mapping[str, Node], path: str, found: _Found) -> dict[str, Mat
     made: list[tuple[dict[str, MatColumn], TimePlan]] = []
     for length in lengths:
         columns = {name: one for name, one in leaves.items() if one.leaf.rows == length}
-        time = _time(columns, found.layout)
-        if time is None:
+        plan = _time(columns, found.layout)
+        if plan is None:
             continue
         for name, leaf in wide.items():
             columns |= _spread(name, leaf, length)
-        if len(columns) > 1 + len(time.stamp):
+        if len(columns) > 1 + len(plan.stamp):
             used |= columns.keys()
-            made.append((columns, time))
+            made.append((columns, plan))
     made.sort(key=lambda one: -len(one[0]))
     for place, (columns, time) in enumerate(made):
         name = _topic(path) if place == 0 else f"{_topic(path) if path else ''}/{time.column}"
@@ -243,10 +243,10 @@ def _matrix(name: str, leaf: Leaf, found: _Found) -> None:
     if width > min(MOST_WIDE, rows) or width < 2:
         return
     names = list(layout.columns) if layout is not None and len(layout.columns) == width else []
-    columns = {
-        names[k] if names else f"column {k + 1}": MatColumn(leaf, k) for k in range(width)
-    }
+    columns = {names[k] if names else f"column {k + 1}": MatColumn(leaf, k) for k in range(width)}
     time = _time(columns, layout)
     if time is not None:
         note = "" if names else "columns are named by their place: give columns under [table] in the profile"
-        found.add(name, columns, TimePlan(time.column, time.unit, time.stamp, "; ".join(filter(None, (time.note, note)))))
+        found.add(
+            name, columns, TimePlan(time.column, time.unit, time.stamp, "; ".join(filter(None, (time.note, note))))
+        )

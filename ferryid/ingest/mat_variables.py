@@ -67,7 +67,7 @@ def read_variables(path: Path) -> MatVariables:
         return _hdf5(path)
     if head.startswith(b"MATLAB 7.3"):
         raise FerryIdError(f"{path}: the MAT file ends within its head. Fix: copy it again, or save it again in MATLAB")
-    if head.startswith(b"# Created by Octave") or head.startswith(b"Octave-1-"):
+    if head.startswith((b"# Created by Octave", b"Octave-1-")):
         raise FerryIdError(
             f"{path}: a file in Octave's own format, found no MAT file. Fix: in Octave, save -v7 log.mat"
         )
@@ -112,14 +112,16 @@ def _level_4(path: Path, content: bytes) -> MatVariables:
     import scipy.io
 
     result = MatVariables()
+    file: Any = io.BytesIO(content)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            found = scipy.io.whosmat(io.BytesIO(content))
+            found = scipy.io.whosmat(file)
             if any(np.prod(shape, dtype=float) > len(content) for _, shape, _ in found):
                 raise ValueError("a variable larger than the file")
-            _add(result, scipy.io.loadmat(io.BytesIO(content)))
-    except Exception as error:  # noqa: BLE001 - SciPy raises whatever a damaged file leads to
+            file.seek(0)
+            _add(result, scipy.io.loadmat(file))
+    except Exception as error:
         raise FerryIdError(
             f"{path}: not a MAT file that can be read ({_reason(error)}). Fix: save it again in MATLAB, or copy it again"
         ) from error
@@ -144,10 +146,11 @@ def _unpacked(content: bytes, position: int, after: int, order: str) -> bytes:
 def _loaded(variable: bytes, order: str, header: bytes) -> Mapping[str, Any]:
     import scipy.io
 
+    file: Any = io.BytesIO(header + variable)
     with warnings.catch_warnings():
         # Names that are no names in Python, and functions that are not kept.
         warnings.simplefilter("ignore")
-        found: Mapping[str, Any] = scipy.io.loadmat(io.BytesIO(header + variable), chars_as_strings=True)
+        found: Mapping[str, Any] = scipy.io.loadmat(file, chars_as_strings=True)
     return found
 
 
@@ -198,9 +201,16 @@ def _structure(value: Any, path: str, result: MatVariables, depth: int) -> Node 
         inner = {name: _node(value[name].flat[0], f"{path}.{name}", result, depth + 1) for name in names}
         return {name: node for name, node in inner.items() if node is not None} or None
     columns: dict[str, Any] = {}
-    for name in names:
+    series = any(
+        isinstance(cell, np.ndarray) and cell.size > 1 and cell.dtype.kind in "fiub"
+        for name in names
+        for cell in value[name].flat
+    )
+    for name in () if series else names:
         cells = list(value[name].flat)
-        if cells and all(isinstance(cell, np.ndarray) and cell.size == 1 and cell.dtype.kind in "fiub" for cell in cells):
+        if cells and all(
+            isinstance(cell, np.ndarray) and cell.size == 1 and cell.dtype.kind in "fiub" for cell in cells
+        ):
             numbers = np.array([cell.flat[0] for cell in cells])
             columns[name] = Leaf(numbers.shape, numbers.dtype.kind, numbers.dtype.name, _constant(numbers))
     if columns:
@@ -248,7 +258,7 @@ def _hdf5(path: Path) -> MatVariables:
                 node = _hdf5_node(path, file, file[name], name, result, 0)
                 if node is not None:
                     result.found[name] = node
-    except Exception as error:  # noqa: BLE001 - h5py raises whatever a damaged file leads to
+    except Exception as error:
         raise FerryIdError(
             f"{path}: the MAT file cannot be read ({_reason(error)}). Fix: copy it again, or save it again in MATLAB"
         ) from error

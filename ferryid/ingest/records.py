@@ -90,7 +90,9 @@ def column_of(data: NDArray[np.uint8], table: RecordTable, name: str) -> Column:
     return raw.astype(field.dtype.newbyteorder("="))
 
 
-def times_of(data: NDArray[np.uint8], table: RecordTable, name: str, since_ns: int) -> tuple[Nanoseconds, NDArray[np.bool_]]:
+def times_of(
+    data: NDArray[np.uint8], table: RecordTable, name: str, since_ns: int
+) -> tuple[Nanoseconds, NDArray[np.bool_]]:
     """Return times of a topic [ns], shape (n,), `since_ns` later than its field has them, and which can be read."""
     counts = column_of(data, table, name)
     most = (FARTHEST_NS - abs(since_ns)) // table.time_ns
@@ -159,7 +161,9 @@ class RecordReader:
         if not good.all():
             bad = int(np.sum(~good))
             losses = (
-                Loss(str(self.paths[0]), f"{counted(bad, 'message')} without a possible time left out", table.name, bad),
+                Loss(
+                    str(self.paths[0]), f"{counted(bad, 'message')} without a possible time left out", table.name, bad
+                ),
             )
         columns = {name: column_of(data, table, name)[good] for name in fields}
         return Series(table.name, times[good], None if stamps is None else stamps[good], columns), losses
@@ -220,6 +224,6 @@ def _listed(names: Sequence[str]) -> str:
     return ", ".join(shown) + (f" and {len(names) - len(shown)} more" if len(names) > len(shown) else "")
 
 
-def with_places(table: RecordTable, places: Sequence[int]) -> RecordTable:
+def with_places(table: RecordTable, places: Sequence[int] | NDArray[np.int64]) -> RecordTable:
     """Return a topic with the messages at these places."""
     return replace(table, places=np.asarray(places, np.int64))

@@ -24,7 +24,10 @@ def _made(base: Base, name: str, content: bytes, what: str, *, cut: bool = False
     # A cell of a text may be changed to another valid one, and a line to none or two.
     if name.endswith((".csv", ".txt")):
         return edited_text(base, name, content, what)
-    return Mutated(f"{name}: {what}", replaced(base, name, content), cut=cut)
+    # Nothing counts the messages of an autopilot: one that ends with a whole message is complete.
+    return Mutated(
+        f"{name}: {what}", replaced(base, name, content), cut=cut, counted=not (cut and name.endswith((".ulg", ".bin")))
+    )
 
 
 def edited_text(base: Base, name: str, content: bytes, what: str, total: int | None = None) -> Mutated | None:

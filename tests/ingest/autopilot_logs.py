@@ -81,9 +81,7 @@ class DataFlash:
 
     def add(self, name: str, *values: Any) -> None:
         number, letters = self._types[name]
-        self.content += bytes([0xA3, 0x95, number]) + struct.pack(
-            "<" + "".join(_PACK[one] for one in letters), *values
-        )
+        self.content += bytes([0xA3, 0x95, number]) + struct.pack("<" + "".join(_PACK[one] for one in letters), *values)
 
     def table(self, rows: list[tuple[Any, ...]]) -> None:
         """Add messages in order of their times: name, time [us], values."""

@@ -1,7 +1,7 @@
 """DataFlash logs of ArduPilot (``.bin``): messages that the log itself defines; one topic for each, and for each instance.
 
-The format is published by ArduPilot (libraries/AP_Logger/LogStructure.h). It has no checksums and no index: opening looks at the
-head of every message, and decodes none but the definitions.
+The format is published by ArduPilot (libraries/AP_Logger/LogStructure.h). It has no checksums and no index: opening looks at
+the head of every message, and decodes none but the definitions.
 """
 
 from __future__ import annotations
@@ -154,9 +154,7 @@ def _size(letter: str) -> int:
     return 2 * _ARRAY if letter == "a" else np.dtype(_TYPES[letter][0]).itemsize
 
 
-def _tables(
-    data: NDArray[np.uint8], scan: _Scan, layout: _Layout, places: NDArray[np.int64]
-) -> list[RecordTable]:
+def _tables(data: NDArray[np.uint8], scan: _Scan, layout: _Layout, places: NDArray[np.int64]) -> list[RecordTable]:
     """Return the topics of one message: one, or one for each instance that its definition names."""
     if layout.name in _DEFINITIONS or not len(places):
         return []
@@ -247,7 +245,11 @@ def _utc(data: NDArray[np.uint8], tables: list[RecordTable]) -> int | None:
 
 
 def _matches(path: Path, head: bytes) -> bool:
-    return path.is_file() and head[:2] == SYNC and (len(head) < _HEAD or head[2] == _FMT or path.suffix.lower() in SUFFIXES)
+    return (
+        path.is_file()
+        and head[:2] == SYNC
+        and (len(head) < _HEAD or head[2] == _FMT or path.suffix.lower() in SUFFIXES)
+    )
 
 
 FORMAT = Format(name="DataFlash log of ArduPilot", matches=_matches, open=_open, order=15, suffixes=SUFFIXES)

@@ -69,8 +69,8 @@ def _without(variables: MatVariables, layout: TableLayout | None) -> str:
         name, kind = next(iter(variables.objects.items()))
         count = len(variables.objects)
         return (
-            f"{counted(count, 'object')} of MATLAB ({name}: {kind}{', ...' if count > 1 else ''}), which only MATLAB reads, and "
-            f"no other time series. Fix: in MATLAB, {_remedy(name, kind)}"
+            f"{counted(count, 'object')} of MATLAB ({name}: {kind}{', ...' if count > 1 else ''}), which only MATLAB reads, "
+            f"and no other time series. Fix: in MATLAB, {_remedy(name, kind)}"
         )
     if variables.losses and not variables.found:
         return f"{variables.losses[0].what}. Fix: copy it again, or save it again in MATLAB"

@@ -31,12 +31,15 @@ from ferryid.ingest.records import (
 MAGIC = b"ULog\x01\x12\x35"
 SUFFIXES = (".ulg", ".ulog")
 _HEADER = 16
-_KINDS = frozenset(b"ABCDFGILMOPQRSJT")
+_KINDS = frozenset(b"ABCDFILMOPQRS")
 _TYPES = {
     "int8_t": "<i1", "uint8_t": "<u1", "int16_t": "<i2", "uint16_t": "<u2", "int32_t": "<i4", "uint32_t": "<u4",
     "int64_t": "<i8", "uint64_t": "<u8", "float": "<f4", "double": "<f8", "bool": "?", "char": "S1",
 }  # fmt: skip
 _PART = re.compile(r"([A-Za-z0-9_/-]+)(?:\[([0-9]{1,5})\])? ([A-Za-z0-9_]+)$")
+_SIZES = {"S": 8, "R": 2}
+_KEYS = {"I": 0, "P": 0, "M": 1, "Q": 1}
+"""Kinds of messages that have a type and a name, and where its length is."""
 _DEEPEST, _MOST_FIELDS = 8, 20_000
 """Messages in messages, and fields of one topic, beyond which a definition is damaged."""
 _CHAIN = 4
@@ -118,7 +121,9 @@ def _losses(path: Path, scan: _Scan) -> list[Loss]:
                 messages=None,
             )
         )
-    losses += [Loss(str(path), f"{name} has no field timestamp and cannot be read", topic=name) for name in scan.untimed]
+    losses += [
+        Loss(str(path), f"{name} has no field timestamp and cannot be read", topic=name) for name in scan.untimed
+    ]
     return losses
 
 
@@ -144,7 +149,12 @@ def _scanned(path: Path, raw: bytes) -> _Scan:
                 places[number].append(position + 5)
                 position = after
                 continue
-        if kind in _KINDS and kind != 68 and after <= end and _taken(path, scan, kind, raw[position + 3 : after], appended):
+        if (
+            kind in _KINDS
+            and kind != 68
+            and after <= end
+            and _taken(path, scan, kind, raw[position + 3 : after], appended)
+        ):
             position = after
             continue
         if after > end and _plausible(raw, position, scan, inside=False):
@@ -181,10 +191,14 @@ def _taken(path: Path, scan: _Scan, kind: int, content: bytes, appended: list[in
             return False
         scan.dropouts += 1
         scan.dropouts_ms += int.from_bytes(content, "little")
-    elif letter == "S":
-        return len(content) == 8
-    elif letter == "R":
-        return len(content) == 2
+    elif letter in _SIZES:
+        return len(content) == _SIZES[letter]
+    elif letter in _KEYS:
+        place = _KEYS[letter]
+        key = content[place + 1 : place + 1 + content[place]] if len(content) > place else b""
+        return len(key) > 2 and key.isascii() and b" " in key
+    elif letter in "LC":
+        return len(content) >= 9 and content[0] in b"01234567"
     return True
 
 
@@ -277,7 +291,7 @@ def _plausible(raw: bytes, position: int, scan: _Scan, *, inside: bool = True) -
         known = scan.sizes.get(raw[position + 3] | raw[position + 4] << 8)
         return known is not None and known[0] <= size - 2 <= known[1]
     expected = {83: 8, 79: 2, 82: 2}.get(kind)
-    return kind in _KINDS and 0 < size and (expected is None or size == expected)
+    return kind in _KINDS and size > 0 and (expected is None or size == expected)
 
 
 def _chained(raw: bytes, position: int, scan: _Scan) -> bool:
@@ -312,14 +326,18 @@ def _utc(data: NDArray[np.uint8], tables: list[RecordTable]) -> int | None:
     for table in tables:
         utc = table.fields.get("time_utc_usec")
         if table.name in _RECEIVERS and utc is not None and utc.dtype.kind == "u":
-            clock, known = (column_of(data, table, name).astype(float) * 1e-6 for name in ("timestamp", "time_utc_usec"))
+            clock, known = (
+                column_of(data, table, name).astype(float) * 1e-6 for name in ("timestamp", "time_utc_usec")
+            )
             if (offset := utc_offset_ns(clock, known)) is not None:
                 return offset
     return None
 
 
 def _matches(path: Path, head: bytes) -> bool:
-    return path.is_file() and (head.startswith(MAGIC[:4]) or (path.suffix.lower() in SUFFIXES and MAGIC.startswith(head)))
+    return path.is_file() and (
+        head.startswith(MAGIC[:4]) or (path.suffix.lower() in SUFFIXES and MAGIC.startswith(head))
+    )
 
 
 FORMAT = Format(name="ULog of PX4", matches=_matches, open=_open, order=15, suffixes=SUFFIXES)

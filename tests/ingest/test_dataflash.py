@@ -1,0 +1,117 @@
+"""DataFlash: against pymavlink, and what logs of a vehicle hold that a sample does not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pymavlink import DFReader
+
+from ferryid.errors import FerryIdError
+from ferryid.ingest import open_log
+from tests.ingest.autopilot_logs import DataFlash
+
+N = 40
+
+
+def boat() -> DataFlash:
+    log = DataFlash()
+    log.define("GPS", "QBBIHBcLLef", "TimeUS,I,Status,GMS,GWk,NSats,HDop,Lat,Lng,Alt,Spd")
+    log.define("ATT", "QccCC", "TimeUS,Roll,Pitch,Yaw,DesYaw")
+    log.define("RCOU", "QHHHH", "TimeUS,C1,C2,C3,C4")
+    log.define("MSG", "QZ", "TimeUS,Message")
+    log.define("PARM", "QNf", "TimeUS,Name,Value")
+    log.define("ODD", "fa", "Value,Samples")
+    log.units("GPS", "s#-------DUmn"[:11])
+    log.add("PARM", 900, b"SERVO1_MIN", 1100.0)
+    rows = [("MSG", 1000, b"ArduRover V4.5")]
+    for k in range(N):
+        us = 1_000_000 + 20_000 * k
+        rows += [
+            ("ATT", us, 100 * k, -50 * k, 9000 + k, 18000),
+            ("RCOU", us + 1, 1500 + k, 1900 - k, 1100, 0),
+            (
+                "GPS",
+                us + 2,
+                k % 2,
+                3,
+                345_600_000 + 20 * k,
+                2300,
+                12,
+                90,
+                634_000_000 + k,
+                104_000_000 - k,
+                150,
+                0.1 * k,
+            ),
+        ]
+    log.table(rows)
+    log.add("ODD", 1.0, *range(32))
+    return log
+
+
+def written(folder: Path, content: bytes, name: str = "00000001.BIN") -> Path:
+    (folder / name).write_bytes(content)
+    return folder / name
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_every_value_is_the_one_that_pymavlink_reads(tmp_path: Path) -> None:
+    path = written(tmp_path, boat().content)
+    reader = open_log(path)
+    listed = {topic.name: topic for topic in reader.topics}
+    assert listed.keys() == {"/GPS", "/GPS[1]", "/ATT", "/RCOU", "/MSG"}
+    theirs: dict[str, list[object]] = {}
+    with_times: dict[str, list[float]] = {}
+    log = DFReader.DFReader_binary(str(path))
+    while (message := log.recv_msg()) is not None:
+        name = f"/{message.get_type()}" + ("[1]" if message.get_type() == "GPS" and message.I == 1 else "")
+        theirs.setdefault(name, []).append(message)
+        with_times.setdefault(name, []).append(message._timestamp)
+    log.close()
+    for name, topic in listed.items():
+        series = reader.read({name: list(topic.fields)})[name]
+        assert len(series.receive_ns) == len(theirs[name])
+        for field, column in series.columns.items():
+            values = [getattr(one, field) for one in theirs[name]]
+            assert column.tolist() == (values if field == "Message" else pytest.approx(values, abs=0, rel=1e-15))
+        assert np.abs(series.receive_ns * 1e-9 - with_times[name]).max() < 2e-6
+    assert reader.losses == ()
+
+
+def test_scales_of_the_format_are_applied(tmp_path: Path) -> None:
+    found = open_log(written(tmp_path, boat().content)).read({"/GPS": ["Lat", "HDop"], "/ATT": ["Yaw"]})
+    assert found["/GPS"].columns["Lat"][0] == pytest.approx(63.4)
+    assert found["/GPS"].columns["HDop"][0] == 0.9
+    assert found["/ATT"].columns["Yaw"][1] == 90.01
+
+
+def test_times_are_utc_where_the_receiver_knew_it(tmp_path: Path) -> None:
+    # GPS week 2300 began on 2024-02-04 at 00:00:00 GPS time; 345600 s into it, and 18 leap seconds.
+    start = open_log(written(tmp_path, boat().content)).read({"/GPS": []})["/GPS"].receive_ns[0]
+    assert np.datetime64(int(start), "ns").astype("datetime64[s]") == np.datetime64("2024-02-07T23:59:42")
+
+
+def test_a_damaged_stretch_is_left_out_and_what_follows_is_read(tmp_path: Path) -> None:
+    content = bytearray(boat().content)
+    middle = len(content) // 2
+    content[middle : middle + 60] = b"\xff" * 60
+    reader = open_log(written(tmp_path, bytes(content)))
+    assert N - 5 <= next(topic.count for topic in reader.topics if topic.name == "/ATT") < N + 1
+    assert sum(topic.count for topic in reader.topics) < 3 * N + 1
+    (loss,) = reader.losses
+    assert "damaged stretch" in loss.what
+
+
+def test_definitions_alone_are_no_log(tmp_path: Path) -> None:
+    log = DataFlash()
+    log.define("ATT", "Qc", "TimeUS,Roll")
+    with pytest.raises(FerryIdError, match=r"holds no data, found 1 definitions.*Fix: "):
+        open_log(written(tmp_path, log.content))
+
+
+def test_it_is_known_by_its_content_whatever_its_name(tmp_path: Path) -> None:
+    assert len(open_log(written(tmp_path, boat().content, "log")).topics) == 5
+    with pytest.raises(FerryIdError, match="not a log of a supported format"):
+        open_log(written(tmp_path, b"\0\1\2\3" * 40, "firmware.bin"))
