@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -160,6 +161,9 @@ class JsonDecoder:
             For a path that none of the messages has.
         """
         for path in self._wanted:
+            first = re.sub(r"\[[0-9]+\]", "[0]", path)
+            if first != path and first in self._wanted and self._rows.seen(first):
+                continue  # a longer array than any message has
             if len(self._rows) and not self._rows.seen(path):
                 fields = list(self._fields or ())
                 shown = ", ".join(fields[:8]) or "no fields"

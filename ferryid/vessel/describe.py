@@ -98,6 +98,14 @@ def _fields(signal: Signal) -> str:
     return ", ".join(signal.fields)
 
 
+def _full(signal: Signal) -> str:
+    """Full power or travel in the unit that a profile states it in."""
+    role = signal.quantity.partition(".")[2].removesuffix(".command")
+    if role == "speed":
+        return f"{signal.full:g} rpm"
+    return f"{signal.full:g} N" if role in ("force", "thrust") else f"{math.degrees(signal.full):g} deg"
+
+
 def _how(signal: Signal) -> str:
     parts = [signal.unit, signal.frame]
     if signal.quantity == "wind" and signal.options:
@@ -109,8 +117,13 @@ def _how(signal: Signal) -> str:
         parts.append("sign reversed")
     if signal.offset:
         parts.append(f"offset {signal.offset:+g}")
-    if signal.full_rpm:
-        parts.append(f"of {signal.full_rpm:g} rpm")
+    if signal.element is not None:
+        parts.append(f"of {signal.element[1]} in {signal.element[0]}")
+    if signal.pulse_us is not None:
+        astern, neutral, ahead, dead = signal.pulse_us
+        parts.append(f"pulses of {astern:g}, {neutral:g} and {ahead:g} with a dead band of {dead:g}")
+    if signal.full:
+        parts.append(f"of {_full(signal)}")
     if signal.quantity == "payload" and len(signal.fields) == 1:
         parts.append(f"standing at x = {signal.mount_m[0]:g} m")
     elif signal.mount_m != (0.0, 0.0):

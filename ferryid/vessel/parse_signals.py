@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 from ferryid.errors import did_you_mean
 from ferryid.vessel.faults import Fault, TableReader
-from ferryid.vessel.profile import Actuator, Signal
+from ferryid.vessel.parse_choices import parse_element, parse_pulses, parse_where
+from ferryid.vessel.profile import Actuator, Element, Signal
 from ferryid.vessel.thrusters import needed_roles
 from ferryid.vessel.units import unit_fault
 
@@ -15,7 +18,9 @@ VESSEL_QUANTITIES = (
     *("wind", "current", "payload", "tau_d", "position_d", "heading_d"),
 )
 ROLE_KINDS = {"speed": "rotation", "angle": "angle", "rudder": "angle", "force": "force", "thrust": "force"}
-Where = tuple[tuple[str, float], ...]
+Chosen = tuple[Element, ...]
+SHARES = ("%", "fraction", "us")
+"""Units of a signal that is a share of full power or of full travel."""
 _OPTIONAL = ("wind", "current", "payload", "tau_d", "position_d", "heading_d", "roll", "pitch")
 
 
@@ -28,7 +33,7 @@ def parse_signals(
     by_name = {actuator.name: actuator for actuator in actuators}
     before = len(faults)
     signals: list[Signal] = []
-    read: dict[tuple[str, str, Where], Signal] = {}
+    read: dict[tuple[str, str, Chosen], Signal] = {}
     for quantity in reader.data:
         table = reader.table(quantity)
         if table is None:
@@ -98,7 +103,7 @@ def _vessel_signal(quantity: str, table: TableReader) -> Signal | None:
         if surge_alone:
             _check_surge(table, frame)
     required = table.flag("required", quantity not in _OPTIONAL)
-    where = _where(table)
+    where = parse_where(table)
     table.close()
     return Signal(
         quantity=quantity,
@@ -187,17 +192,21 @@ def _actuator_signal(quantity: str, table: TableReader, actuators: dict[str, Act
         )
         return None
     topic = table.text("topic", required=True)
-    fields = (table.text("field", required=True),)
-    full_rpm = 0.0
-    if role == "speed" and table.data.get("unit") in ("%", "fraction"):
+    fields: tuple[str, ...] = (table.text("field", required=True),)
+    full, pulse_us = 0.0, None
+    if table.data.get("unit") in SHARES:
         unit = table.text("unit")
-        full_rpm = table.number("full_rpm", required=True, above=0.0, within=1e6, needs="the speed at full throttle")
+        full = _full(table, role)
+        pulse_us = parse_pulses(table) if unit == "us" else None
     else:
         unit = _unit(table, ROLE_KINDS[role])
-    sign, offset = _sign(table), table.number("offset", 0.0)
+    sign, offset = _sign(table), 0.0 if pulse_us is not None else table.number("offset", 0.0)
+    element = parse_element(table)
+    if element is not None:
+        fields = tuple(path if "[]" in path else f"{path}[]" for path in fields)
     required = table.flag("required", not quantity.endswith(".command"))
     table.has("shared")
-    where = _where(table)
+    where = parse_where(table)
     table.close()
     return Signal(
         quantity=quantity,
@@ -208,21 +217,22 @@ def _actuator_signal(quantity: str, table: TableReader, actuators: dict[str, Act
         offset=offset,
         required=required,
         line=table.line(),
-        full_rpm=full_rpm,
+        full=full,
         where=where,
+        pulse_us=pulse_us,
+        element=element,
     )
 
 
-def _where(table: TableReader) -> tuple[tuple[str, float], ...]:
-    """Take the fields and values of the messages that hold a signal, on a topic that carries several."""
-    chosen = table.table("where")
-    if chosen is None:
-        return ()
-    if not chosen.data:
-        table.fault('"where" names no field. Fix: where = { MsgID = 5 }, or leave it out', "where")
-    found = tuple((path, chosen.number(path)) for path in sorted(chosen.data))
-    chosen.close()
-    return found
+def _full(table: TableReader, role: str) -> float:
+    """Take what a share of one is: rpm, N, or an angle, returned in radians."""
+    if role == "speed":
+        return table.number("full_rpm", required=True, above=0.0, within=1e6, needs="the speed at full throttle")
+    if role in ("force", "thrust"):
+        return table.number("full_N", required=True, above=0.0, within=1e9, needs="the force at full throttle")
+    return math.radians(
+        table.number("full_deg", required=True, above=0.0, within=360.0, needs="the angle at full travel")
+    )
 
 
 def _unit(table: TableReader, kind: str, key: str = "unit", *, default: str = "") -> str:
@@ -273,7 +283,7 @@ def _mount(table: TableReader) -> tuple[float, float]:
     return (place[0], place[1]) if place else (0.0, 0.0)
 
 
-def _check_own_fields(table: TableReader, signal: Signal, read: dict[tuple[str, str, Where], Signal]) -> None:
+def _check_own_fields(table: TableReader, signal: Signal, read: dict[tuple[str, str, Chosen], Signal]) -> None:
     """Note a field that is read twice: lines that were copied and not changed.
 
     Two actuators may follow one signal where the file says so, and the commanded force may be the order of the only one.
@@ -283,7 +293,8 @@ def _check_own_fields(table: TableReader, signal: Signal, read: dict[tuple[str, 
     name, _, rest = signal.quantity.partition(".")
     may_share = bool(rest) and table.flag("shared", False)
     for place, path in enumerate(signal.fields):
-        other = read.setdefault((signal.topic.strip("/"), path, signal.where), signal)
+        chosen = signal.where if signal.element is None else (*signal.where, signal.element)
+        other = read.setdefault((signal.topic.strip("/"), path, chosen), signal)
         if not path or (other is signal and path not in signal.fields[:place]):
             continue
         other_name, _, other_rest = other.quantity.partition(".")

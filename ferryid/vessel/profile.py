@@ -94,15 +94,21 @@ class WindAreas:
     delta: float
 
 
+Element = tuple[str, str | float]
+"""The array of names in a message (``"name[]"``), and the name of the entry that is meant."""
+
+
 @dataclass(frozen=True)
 class Signal:
     """One entry of the signal map: the fields of one topic that give one canonical quantity.
 
     `quantity` is the key in the file (``position``, ``heading``, ``velocity``, ``yaw_rate``, ``wind``, ``payload`` or
     ``<actuator>.<speed|angle|rudder|force|thrust>`` with ``.command`` appended for orders); `line` is its line there.
-    A scalar is ``sign * value + offset`` in `unit`, and a propeller speed in ``%`` or ``fraction`` is of `full_rpm`.
+    A scalar is ``sign * value + offset`` in `unit`. A speed, force or angle in ``%``, ``fraction`` or ``us`` is a share of
+    `full` [rpm, N, rad]; `pulse_us` are the pulses of full astern, neutral and full ahead, and the dead band [us].
     `mount_m` is where an antenna or a log sits, or a payload whose place is not measured (x forward, y starboard of the
-    body origin) [m]. On a topic of several signals `where` chooses its messages: fields and their values.
+    body origin) [m]. On a topic of several signals `where` chooses its messages: fields and their values. In an array whose
+    entries have names, `element` is the array of names and the signal's own.
     """
 
     quantity: str
@@ -115,9 +121,11 @@ class Signal:
     options: Mapping[str, str] = field(default_factory=dict)
     required: bool = True
     line: int = 0
-    full_rpm: float = 0.0
+    full: float = 0.0
     mount_m: tuple[float, float] = (0.0, 0.0)
     where: tuple[tuple[str, float], ...] = ()
+    pulse_us: tuple[float, float, float, float] | None = None
+    element: Element | None = None
 
 
 SETTINGS = ("tank", "pond", "harbour", "sea")

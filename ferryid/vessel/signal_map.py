@@ -20,12 +20,13 @@ from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.ingest.log import Loss, Series, Topic
 from ferryid.types import Floats
+from ferryid.vessel.elements import TEXT_TYPES, array_fault, element_fields, has_element, picked
 from ferryid.vessel.frames import heading_from_enu, local_north_east, yaw_of_quaternion
 from ferryid.vessel.profile import Profile, Signal
+from ferryid.vessel.pulses import share_of_pulse
 from ferryid.vessel.thrusters import ROLE_PREFIX, needed_roles, order_note
 from ferryid.vessel.units import factor
 
-_TEXT_TYPES = frozenset({"string", "wstring", "str", "object", "large_string", "utf8", "datetime"})
 _SIMPLE = {
     "position": ("x", "y"),
     "heading": ("psi",),
@@ -95,10 +96,11 @@ def survey(profile: Profile, topics: Sequence[Topic], losses: Sequence[Loss] = (
             missing[signal.quantity] = reason
             continue
         paths = wanted.setdefault(topic.name, [])
-        paths.extend(path for path in _read_fields(signal) if path not in paths)
+        paths.extend(path for path in _read_fields(signal, topic) if path not in paths)
         columns = canonical_columns(signal)
         shown = signal.fields if len(columns) == len(signal.fields) else (", ".join(signal.fields),)
-        found.update({column: f"{topic.name}: {path}" for column, path in zip(columns, shown, strict=True)})
+        chosen = "" if signal.element is None else f" of {signal.element[1]}"
+        found.update({column: f"{topic.name}: {path}{chosen}" for column, path in zip(columns, shown, strict=True)})
     notes = tuple(order_note(name, role) for name, role in _orders_instead(profile, missing))
     return Selection({name: tuple(paths) for name, paths in wanted.items()}, found, missing, notes)
 
@@ -177,8 +179,9 @@ def is_in(signal: Signal, stream: str) -> bool:
     return _bare(stream_name(signal.topic, signal.where)) == _bare(stream)
 
 
-def _read_fields(signal: Signal) -> tuple[str, ...]:
-    return (*signal.fields, *(path for path, _ in signal.where))
+def _read_fields(signal: Signal, topic: Topic) -> tuple[str, ...]:
+    fields = signal.fields if signal.element is None else element_fields(signal, topic)
+    return (*fields, *(path for path, _ in signal.where))
 
 
 def convert(profile: Profile, series: Series, where: tuple[tuple[str, float], ...] = ()) -> dict[str, Floats]:
@@ -207,9 +210,12 @@ def convert(profile: Profile, series: Series, where: tuple[tuple[str, float], ..
     for signal in profile.signals:
         if _bare(signal.topic) != _bare(series.topic) or signal.where != where:
             continue
-        if not set(signal.fields) <= set(series.columns):
+        own = series
+        if signal.element is not None and has_element(signal, series.columns):
+            own = picked(signal, signal.element, series)
+        if not set(signal.fields) <= set(own.columns):
             continue
-        values = [_numeric(series, path, signal) for path in signal.fields]
+        values = [_numeric(own, path, signal) for path in signal.fields]
         _check_turns(profile, signal, values)
         columns.update(zip(canonical_columns(signal), _convert(signal, values, series.topic), strict=True))
     return columns
@@ -241,8 +247,10 @@ def _convert(signal: Signal, values: list[Floats], topic: str) -> list[Floats]:
         angle = _scalar(signal, values[0], factor(signal.unit, "angle"))
         return [-angle if quantity == "pitch" and signal.frame == "FLU" else angle]
     role = quantity.partition(".")[2].removesuffix(".command")
-    if signal.full_rpm:
-        return [_scalar(signal, values[0], factor(signal.unit, "fraction") * signal.full_rpm)]
+    if signal.pulse_us is not None:
+        return [signal.sign * signal.full * share_of_pulse(values[0], signal.pulse_us)]
+    if signal.full:
+        return [_scalar(signal, values[0], factor(signal.unit, "fraction") * signal.full)]
     return [_scalar(signal, values[0], factor(signal.unit, _ROLE_KIND[role]))]
 
 
@@ -352,14 +360,16 @@ def _fault(signal: Signal, topic: Topic | None, topics: Sequence[Topic], losses:
         return f'found no topic "{signal.topic}".{hint}'
     if topic.count == 0:
         return f"found {topic.name} without a single message"
-    for path in _read_fields(signal):
+    if signal.element is not None and (fault := array_fault(signal, topic)):
+        return fault
+    for path in (*(signal.fields if signal.element is None else ()), *(one for one, _ in signal.where)):
         kind = _field_type(path, topic)
         if kind is None:
             return (
                 f'found no field "{path}" in {topic.name} (it has {_some(list(topic.fields)) or "no readable definition"}).'
                 f"{did_you_mean(path, topic.fields)}"
             )
-        if kind in _TEXT_TYPES:
+        if kind in TEXT_TYPES:
             return f'found text ("{kind}") in the field {path} of {topic.name}, where a number is needed'
     return ""
 

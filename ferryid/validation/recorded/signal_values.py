@@ -12,6 +12,7 @@ from ferryid.ingest.log import Column, Series
 from ferryid.types import Floats
 from ferryid.vessel.frames import wrap
 from ferryid.vessel.profile import Profile, Signal
+from ferryid.vessel.pulses import pulse_of_share
 from ferryid.vessel.signal_map import canonical_columns, convert
 from ferryid.vessel.units import factor
 
@@ -43,6 +44,8 @@ def with_columns(profile: Profile, series: Series, changed: Mapping[str, Floats]
         mine = [name for name in columns if name in changed]
         if not mine or signal.topic.strip("/") != series.topic.strip("/") or not set(mine) <= set(before):
             continue
+        if signal.element is not None:
+            raise ValueError(f"{signal.quantity} lies in an array, and is not rewritten")
         old = [before[name] for name in columns]
         new = [np.asarray(changed.get(name, before[name]), dtype=np.float64) for name in columns]
         fields = [raw[path] for path in signal.fields]
@@ -75,8 +78,10 @@ def _raw(signal: Signal, fields: list[Column], old: list[Floats], new: list[Floa
     role = quantity.partition(".")[2].removesuffix(".command")
     if role not in _ROLE_KIND:
         raise ValueError(f"{quantity} is not rewritten")
-    if signal.full_rpm:
-        return [_scalar(signal, new[0], factor(signal.unit, "fraction") * signal.full_rpm)]
+    if signal.pulse_us is not None:
+        return [pulse_of_share(new[0] / (signal.full * signal.sign), signal.pulse_us)]
+    if signal.full:
+        return [_scalar(signal, new[0], factor(signal.unit, "fraction") * signal.full)]
     if role == "angle":
         return [_angle(signal, fields[0], wrap(new[0] - old[0]))]
     return [_scalar(signal, new[0], factor(signal.unit, _ROLE_KIND[role]))]
