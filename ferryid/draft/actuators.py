@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -84,7 +85,9 @@ def _signal(name: str, kind: str, role: str, order: bool, field: ActuatorField, 
     values = samples.raw(field.stream, field.path)
     values = values[np.isfinite(values)]
     largest = float(np.quantile(np.abs(values), 0.99)) if values.size else 0.0
-    unit, why, doubt = _unit(role, field, largest)
+    is_output = re.fullmatch(r"output[0-9]+", name) is not None
+    low = float(np.quantile(values, 0.01)) if values.size else 0.0
+    unit, why, doubt = _unit(role, field, largest, low)
     evidence = (
         *([f"{'an order' if order else 'feedback'}, by its name"] if field.order is not None else []),
         f"{unit}: {why}",
@@ -96,18 +99,39 @@ def _signal(name: str, kind: str, role: str, order: bool, field: ActuatorField, 
         unit,
         where=field.where,
         evidence=evidence,
-        doubts=tuple(filter(None, [doubt, "" if field.order is not None else UNKNOWN_ORDER])),
+        doubts=tuple(
+            filter(
+                None,
+                [
+                    doubt,
+                    "" if field.order is not None else UNKNOWN_ORDER,
+                    "what this output of the autopilot drives: a thruster, a rudder or a gear" if is_output else "",
+                ],
+            )
+        ),
     )
 
 
-def _unit(role: str, field: ActuatorField, largest: float) -> tuple[str, str, str]:
+def _share(least: float, largest: float, shown: str) -> tuple[str, str, str]:
+    """Return unit, why, and what to check of a share of full power or travel, by its least and its largest values."""
+    if DRAFT.least_pulse_us <= least and largest <= DRAFT.most_pulse_us:
+        return "us", shown, "pulses of full astern, neutral and full ahead, and the dead band, are usual ones"
+    if largest <= 1.0:
+        return "fraction", shown, ""
+    return "%", shown, "a share of full power, or a pulse width: offset and full_rpm turn it into a speed"
+
+
+def _unit(role: str, field: ActuatorField, largest: float, least: float = 0.0) -> tuple[str, str, str]:
     """Return unit, why, and what to check."""
     kind = {"angle": "angle", "rudder": "angle", "force": "force", "speed": "rotation", "duty": "fraction"}[role]
-    stated = unit_of_name(field.path, kind)
+    # In messages a number in brackets is the place in an array.
+    stated = "" if re.search(r"\[[0-9]+\]$", field.path) else unit_of_name(field.path, kind)
     words = {*words_of(field.path), *words_of(field.topic)}
     shown = f"99 % of the values lie within {largest:.4g}"
     if stated:
         return stated, "in its name", ""
+    if kind == "angle" and field.path.startswith("control["):
+        return "fraction", f"{shown}, of full travel as PX4 orders it", "full_deg is the angle at full travel"
     if kind == "angle":
         if largest > DRAFT.most_rad:
             return "deg", f"{shown}, more than a turn in radians", ""
@@ -115,7 +139,7 @@ def _unit(role: str, field: ActuatorField, largest: float) -> tuple[str, str, st
     if kind == "force":
         return "N", shown, "the unit is assumed"
     if kind == "fraction":
-        return "%", shown, "a share of full power, or a pulse width: offset and full_rpm turn it into a speed"
+        return _share(least, largest, shown)
     named = next((unit for unit in ("rpm", "rps") if unit in words), "")
     if named:
         return named, "in its name", ""

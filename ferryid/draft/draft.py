@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ferryid.draft.actuator_fields import actuator_fields, parted, shared_topics
 from ferryid.draft.actuators import UNKNOWN_ORDER, DraftedActuator, drafted_actuators
+from ferryid.draft.autopilots import autopilot_fields, moving
 from ferryid.draft.fields import navigation_groups
 from ferryid.draft.kinematics import navigation_signals
 from ferryid.draft.mapped import MappedSignal
@@ -74,7 +75,8 @@ def draft_profile(log: str | Path, like: Profile | None = None, ranges: TimeRang
     """
     reader = open_log(log, None if like is None else like.table)
     topics = reader.topics
-    groups, fields, winds = navigation_groups(topics), actuator_fields(topics), wind_fields(topics)
+    autopilot = autopilot_fields(topics)
+    groups, fields, winds = navigation_groups(topics), autopilot or actuator_fields(topics), wind_fields(topics)
     if not groups and not fields and any("named by their place" in topic.note for topic in topics):
         raise FerryIdError(
             f"{log}: its columns have no names, so that nothing shows what they are. Fix: add a header row, or give --like a "
@@ -96,6 +98,7 @@ def draft_profile(log: str | Path, like: Profile | None = None, ranges: TimeRang
             f"{log}: {_nothing(topics)}. Fix: write the signal map by hand, see ferryid vessel show --toml"
         )
     samples = read_samples(reader, wanted, str(log), ranges)
+    fields = moving(fields, samples) if autopilot else fields
     for bus in shared:
         more, samples = parted(bus, samples)
         fields += more

@@ -82,7 +82,9 @@ _NO_MEASUREMENT = frozenset(
 )
 PLACE = frozenset({"position", "pos", "translation", "point", "location", "pose", "odom", "odometry", "place"})
 SPEEDS = frozenset({"linear", "velocity", "velo", "vel", "twist", "speed", "velocities"})
-RATES = frozenset({"angular", "gyro", "gyroscope", "omega", "rates", "angvelo", "rate", "angvel", "yawrate", "zgyro"})
+RATES = frozenset(
+    {"angular", "gyro", "gyr", "gyroscope", "omega", "rates", "angvelo", "rate", "angvel", "yawrate", "zgyro"}
+)
 HEADING = frozenset({"heading", "hdg", "yaw", "psi", "compass", "hdt"})
 _QUATERNION = frozenset({"orientation", "rotation", "quaternion", "heading", "attitude"})
 ACTUATORS = frozenset(
@@ -114,7 +116,7 @@ ACTUATORS = frozenset(
     ]
 )
 _PAIRS: Mapping[str, tuple[tuple[str, str], ...]] = {
-    "position": (("n", "e"), ("north", "east"), ("northing", "easting"), ("xn", "yn")),
+    "position": (("n", "e"), ("north", "east"), ("northing", "easting"), ("xn", "yn"), ("pn", "pe")),
     "velocity": (
         ("u", "v"),
         ("u", "vm"),
@@ -207,9 +209,10 @@ def _of_topic(topic: Topic, around: set[str], fields: Mapping[str, tuple[str, ..
         for first, second in pairs:
             if {first, second} <= every.keys():
                 found.append((kind, (every[first], every[second]), ""))
-    if {"latitude", "longitude"} <= every.keys() or {"lat", "lon"} <= every.keys():
-        names = ("latitude", "longitude") if "latitude" in every else ("lat", "lon")
-        found.append(("position", (every[names[0]], every[names[1]]), "geodetic"))
+    for names in (("latitude", "longitude"), ("lat", "lon"), ("lat", "lng")):
+        if set(names) <= every.keys():
+            found.append(("position", (every[names[0]], every[names[1]]), "geodetic"))
+            break
     alone = len(fields) == 1
     for path, words in fields.items():
         said = set(words) | (around if alone else set())

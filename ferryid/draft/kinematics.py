@@ -293,7 +293,7 @@ def _shown(chosen: _Agreement) -> str:
     if chosen.velocity is None:
         return f"the vessel moves along its heading (mean cosine {chosen.share:.2f})"
     return (
-        f"its slope{', turned by the heading, ' if chosen.frame in _BODY else ''}explains {100 * chosen.share:.0f} % of "
+        f"its slope{', turned by the heading,' if chosen.frame in _BODY else ''} explains {100 * chosen.share:.0f} % of "
         f"{chosen.velocity.label}, gain {chosen.gain:.3g}"
     )
 

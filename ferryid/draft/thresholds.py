@@ -33,6 +33,18 @@ class DraftThresholds:
         0.5, "of the variance", "a velocity of which the pose explains less is a doubt", "convention: half"
     )
     most_rad: float = threshold(6.6, "rad", "an angle that goes beyond is in degrees", "derived: 2π and 5 % of it")
+    least_pulse_us: float = threshold(
+        700.0,
+        "us",
+        "an order that stays above it may be a pulse width",
+        "convention: servos take 1000 to 2000 us, few 800",
+    )
+    most_pulse_us: float = threshold(
+        2300.0,
+        "us",
+        "an order that stays below it may be a pulse width",
+        "convention: servos take 1000 to 2000 us, few 2200",
+    )
     fewest_rows: int = threshold(50, "rows", "fewer show nothing", "convention: ten seconds of the grid")
     jump: float = threshold(
         3.0,

@@ -66,6 +66,21 @@ class Answers:
     values: Mapping[str, str] = field(default_factory=dict)
 
 
+_FULL = {
+    "full_rpm": ("speed at full power [rpm]", "1000.0"),
+    "full_deg": ("angle at full travel [deg]", "35.0"),
+}
+"""What a share of one is: key to its meaning and an example."""
+
+
+def _full_key(signal: MappedSignal) -> str:
+    """Return the key of a signal that is a share of full power or travel, empty for others."""
+    if signal.unit not in ("%", "fraction", "us"):
+        return ""
+    role = signal.quantity.partition(".")[2].removesuffix(".command")
+    return {"speed": "full_rpm", "angle": "full_deg", "rudder": "full_deg"}.get(role, "")
+
+
 def open_lines(text: str) -> int:
     """Return how many lines of a drafted profile a person has to complete."""
     return sum(line.startswith(MARK) for line in text.splitlines())
@@ -140,8 +155,11 @@ def questions(draft: Draft) -> list[Question]:
             asked.append(Question(f"{one.name}.thrust", f"{one.name}: its thrust ahead at that speed [N]", "500"))
         if one.kind == "propeller_rudder":
             asked += [Question(f"{one.name}.{key}", f"{one.name}: {what}", hint) for key, what, hint, _ in _RUDDER]
-        if any(signal.unit == "%" for signal in one.signals):
-            asked.append(Question(f"{one.name}.full_rpm", f"{one.name}: its speed at full power [rpm]", "1000"))
+        for signal in one.signals:
+            key = _full_key(signal)
+            if key and not any(question.key == f"{one.name}.{key}" for question in asked):
+                what, hint = _FULL[key]
+                asked.append(Question(f"{one.name}.{key}", f"{one.name}: {what}", hint))
     return asked
 
 
@@ -298,9 +316,13 @@ def _signal(signal: MappedSignal, answers: Answers) -> list[str]:
         lines.append(f"where = {{ {chosen} }}")
     if signal.unit != "quaternion":
         lines.append(f"unit = {_text(signal.unit)}")
-    if signal.unit == "%":
-        key = f"{signal.quantity.partition('.')[0]}.full_rpm"
-        lines.append(_entry(answers, key, "full_rpm", "1000.0", "speed at full power"))
+    if signal.unit == "us":
+        lines.append(
+            "pulse_us = [1100, 1500, 1900]    # full astern, neutral, full ahead; dead_band_us = ... beside neutral"
+        )
+    if key := _full_key(signal):
+        what, hint = _FULL[key]
+        lines.append(_entry(answers, f"{signal.quantity.partition('.')[0]}.{key}", key, hint, what))
     lines += [f"{key} = {_text(value)}" for key, value in signal.options]
     if signal.frame:
         lines.append(f"frame = {_text(signal.frame)}")

@@ -1,0 +1,60 @@
+"""What the autopilots PX4 and ArduPilot order of motors and servos: the names are theirs, the boat's are not in their logs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ferryid.draft.actuator_fields import ActuatorField
+from ferryid.draft.fields import rate_of
+from ferryid.draft.samples import Samples
+from ferryid.ingest.log import Topic
+
+_ORDERS = (
+    ("actuator_motors", "control[{}]", 0, "motor", "duty"),
+    ("actuator_servos", "control[{}]", 0, "servo", "rudder"),
+    ("actuator_outputs", "output[{}]", 0, "output", "duty"),
+    ("RCOU", "C{}", 1, "output", "duty"),
+)
+"""Topic, field, number of the first, name and role of what autopilots order."""
+_MOST = 16
+
+
+def autopilot_fields(topics: Sequence[Topic]) -> list[ActuatorField]:
+    """Return the orders of an autopilot to its motors, servos or outputs; nothing for a log of something else."""
+    by_name = {topic.name.strip("/"): topic for topic in topics if topic.encoding in ("ulog", "dataflash")}
+    found: list[ActuatorField] = []
+    for name, path, first, base, role in _ORDERS:
+        topic = by_name.get(name)
+        # Outputs are what motors and servos become, in pulses.
+        if topic is None or topic.count < 2 or (base == "output" and found):
+            continue
+        found += [
+            ActuatorField(f"{base}{k + 1}", role, True, topic.name, path.format(k + first), rate_of(topic))
+            for k in range(_MOST)
+            if path.format(k + first) in topic.fields
+        ]
+    return found
+
+
+def moving(fields: Sequence[ActuatorField], samples: Samples) -> list[ActuatorField]:
+    """Return the orders that change, each servo as the angle of its motor where that is clear.
+
+    One motor and one servo are a propeller and a rudder, as many servos as motors azimuths; of other numbers only a person
+    knows what a servo turns.
+    """
+    kept = []
+    for field in fields:
+        values = samples.raw(field.stream, field.path) if (field.stream, field.path) in samples.columns else np.empty(0)
+        if np.unique(values[np.isfinite(values)]).size > 1:
+            kept.append(field)
+    motors = [one for one in kept if not one.actuator.startswith("servo")]
+    servos = [one for one in kept if one.actuator.startswith("servo")]
+    if not servos or len(servos) != len(motors):
+        return motors
+    role = "rudder" if len(motors) == 1 else "angle"
+    return motors + [
+        replace(servo, actuator=motor.actuator, role=role) for motor, servo in zip(motors, servos, strict=True)
+    ]
