@@ -82,6 +82,7 @@ _UNRELATED = frozenset(
         "wind",
         "wrench",
         "tau",
+        "reset",
     ]
 )
 _MARKS = frozenset(

@@ -1,0 +1,140 @@
+"""Drafts from logs of autopilots: what PX4 and ArduPilot call pose, velocity and orders."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ferryid.draft import Answers, Draft, draft_profile, draft_text, questions
+from ferryid.errors import FerryIdError
+from ferryid.signals.recording import record
+from ferryid.vessel import check_profile, load_profile
+from tests.draft.test_draft import Columns, sailed
+from tests.ingest.autopilot_logs import DataFlash, ulog
+
+
+@pytest.fixture(scope="module")
+def trial() -> Columns:
+    """A trial with velocity over ground, and latitude and longitude near Trondheim [deg]."""
+    made = sailed(120.0)
+    u, v, psi = made["u"], made["v"], made["psi"]
+    made["vn"], made["ve"] = u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi)
+    made["lat"] = 63.4 + np.degrees(made["N"] / 6.371e6)
+    made["lon"] = 10.4 + np.degrees(made["E"] / (6.371e6 * np.cos(np.radians(63.4))))
+    return made
+
+
+def px4(trial: Columns, *, actuators: bool = True) -> bytes:
+    t = (trial["t"] * 1e6).astype(np.uint64) + 1_000_000
+    single = {name: values.astype(np.float32) for name, values in trial.items()}
+    zero, heading = 0 * single["u"], (trial["psi"] + np.pi) % (2 * np.pi) - np.pi
+    unused = np.full((len(t), 10), np.nan)
+    topics: dict[str, dict[str, Any]] = {
+        "vehicle_attitude": {
+            "timestamp": t,
+            "timestamp_sample": t - 200,
+            "q": np.column_stack([np.cos(heading / 2), zero, zero, np.sin(heading / 2)]).astype(np.float32),
+            "delta_q_reset": np.zeros((len(t), 4), np.float32),
+        },
+        "vehicle_local_position": {
+            "timestamp": t,
+            "timestamp_sample": t - 200,
+            "x": single["N"],
+            "y": single["E"],
+            "z": zero,
+            "vx": single["vn"],
+            "vy": single["ve"],
+            "vz": zero,
+            "heading": heading.astype(np.float32),
+        },
+        "vehicle_attitude_setpoint": {"timestamp": t, "yaw_body": heading.astype(np.float32)},
+    }
+    if actuators:
+        motors, servos = np.c_[trial["n"] / 1000, unused], np.c_[trial["rudder"] / 0.7, unused]
+        topics["actuator_motors"] = {"timestamp": t, "control": motors.astype(np.float32)}
+        topics["actuator_servos"] = {"timestamp": t, "control": servos.astype(np.float32)}
+        topics["actuator_outputs"] = {"timestamp": t, "output": np.c_[1500 + 400 * motors].astype(np.float32)}
+    return ulog(topics)
+
+
+def ardupilot(trial: Columns) -> bytes:
+    log = DataFlash()
+    log.define("ATT", "QccC", "TimeUS,Roll,Pitch,Yaw")
+    log.define("GPS", "QBBIHLLff", "TimeUS,I,Status,GMS,GWk,Lat,Lng,Spd,GCrs")
+    log.define("XKF1", "QBCffff", "TimeUS,C,Yaw,VN,VE,PN,PE")
+    log.define("IMU", "QBfff", "TimeUS,I,GyrX,GyrY,GyrZ")
+    log.define("RCOU", "QHHH", "TimeUS,C1,C2,C3")
+    for name in ("XKF1", "IMU", "GPS"):
+        log.units(name, "s#---")
+    rows: list[tuple[Any, ...]] = []
+    for k, t in enumerate((trial["t"] * 1e6).astype(int).tolist()):
+        one = {name: float(values[k]) for name, values in trial.items()}
+        yaw = int(np.degrees(one["psi"]) % 360 * 100)
+        rows += [("ATT", t, 0, 0, yaw), ("RCOU", t, int(1500 + 500 * one["rudder"]), 0, int(1500 + 0.3 * one["n"]))]
+        rows += [("XKF1", t, core, yaw, one["vn"], one["ve"], one["N"], one["E"]) for core in (0, 1)]
+        rows.append(("IMU", t, 0, 0.0, 0.0, one["r"]))
+        if k % 2 == 0:
+            place = (int(one["lat"] * 1e7), int(one["lon"] * 1e7))
+            rows.append(("GPS", t, 0, 3, 345_600_000 + t // 1000, 2300, *place, np.hypot(one["vn"], one["ve"]), 0.0))
+    log.table(rows)
+    return log.content
+
+
+def shown(draft: Draft) -> dict[str, tuple[str, tuple[str, ...], str, str]]:
+    return {one.quantity: (one.topic, one.fields, one.unit, one.frame) for one in draft.every}
+
+
+def test_a_draft_from_px4(trial: Columns, tmp_path: Path) -> None:
+    (tmp_path / "boat.ulg").write_bytes(px4(trial))
+    draft = draft_profile(tmp_path / "boat.ulg")
+    local = "/vehicle_local_position"
+    assert shown(draft) == {
+        "position": (local, ("x", "y"), "m", "NED"),
+        "heading": (local, ("heading",), "rad", "NED"),
+        "velocity": (local, ("vx", "vy"), "m/s", "NED"),
+        "motor1.speed.command": ("/actuator_motors", ("control[0]",), "fraction", ""),
+        "motor1.rudder.command": ("/actuator_servos", ("control[0]",), "fraction", ""),
+    }
+    assert [(one.name, one.kind) for one in draft.actuators] == [("motor1", "propeller_rudder")]
+
+
+def test_a_draft_from_ardupilot(trial: Columns, tmp_path: Path) -> None:
+    (tmp_path / "boat.bin").write_bytes(ardupilot(trial))
+    draft = draft_profile(tmp_path / "boat.bin")
+    assert shown(draft) == {
+        "position": ("/XKF1", ("PN", "PE"), "m", "NED"),
+        "heading": ("/ATT", ("Yaw",), "deg", "NED"),
+        "velocity": ("/XKF1", ("VN", "VE"), "m/s", "NED"),
+        "yaw_rate": ("/IMU", ("GyrZ",), "rad/s", "FRD"),
+        "output1.speed.command": ("/RCOU", ("C1",), "us", ""),
+        "output3.speed.command": ("/RCOU", ("C3",), "us", ""),
+    }
+    assert all(any("drives" in doubt for doubt in one.signals[0].doubts) for one in draft.actuators)
+
+
+@pytest.mark.parametrize("name", ["boat.ulg", "boat.bin"])
+def test_an_answered_draft_is_a_profile_that_reads_its_log(trial: Columns, tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_bytes(px4(trial) if name.endswith("ulg") else ardupilot(trial))
+    draft = draft_profile(tmp_path / name)
+    answers = Answers("boat", {one.key: one.hint for one in questions(draft)})
+    (tmp_path / "boat.toml").write_text(draft_text(draft, answers), encoding="utf-8")
+    assert not [fault for fault in check_profile(str(tmp_path / "boat.toml")) if not fault.warning]
+    recording = record(tmp_path / name, load_profile(str(tmp_path / "boat.toml")))
+    columns = {name: values for stream in recording.streams.values() for name, values in stream.columns.items()}
+    order = "n_cmd_motor1" if name.endswith("ulg") else "n_cmd_output3"
+    # A full speed of 1000 rpm, as answered; the pulses of 1500 to 1900 us order 0.3 of 400 us for 1 rpm of the trial in 1000.
+    scale = 1.0 if name.endswith("ulg") else 0.3 / 400.0 * 1000.0
+    np.testing.assert_allclose(columns[order], trial["n"] * scale, atol=2.6)
+    if name.endswith("ulg"):
+        np.testing.assert_allclose(columns["delta_cmd_motor1"], trial["rudder"] / 0.7 * np.radians(35.0), atol=1e-6)
+
+
+def test_a_log_of_an_autopilot_without_orders_is_one_line(trial: Columns, tmp_path: Path) -> None:
+    (tmp_path / "boat.ulg").write_bytes(px4(trial, actuators=False))
+    with pytest.raises(
+        FerryIdError, match=r"no field looks like an actuator.*vehicle_local_position.*Fix: record the orders"
+    ):
+        draft_profile(tmp_path / "boat.ulg")
