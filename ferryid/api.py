@@ -73,7 +73,25 @@ def _quiet(_line: str) -> None:
 
 
 def _paths(logs: Logs) -> list[str]:
-    return [str(logs)] if isinstance(logs, str | Path) else [str(log) for log in logs]
+    """Return logs as paths; those of a URL where their copies are."""
+    named = [str(logs)] if isinstance(logs, str | Path) else [str(log) for log in logs]
+    if not any("://" in log for log in named):
+        return named
+    from ferryid.ingest.remote import local_logs
+
+    return [path for log in named for path in local_logs(log)]
+
+
+def _path(log: str | Path) -> str:
+    """Return a single log as a path."""
+    paths = _paths(log)
+    if len(paths) > 1:
+        from ferryid.errors import FerryIdError
+
+        raise FerryIdError(
+            f"{log}: matches {len(paths)} logs, one was to be read. Fix: name one, the first is {paths[0]}"
+        )
+    return paths[0]
 
 
 def _profile(vessel: str | Path | Profile) -> Profile:
@@ -181,11 +199,12 @@ def inspect(
     from ferryid.signals.inspect import render_inspect
     from ferryid.vessel import stated_choice
 
+    path = _path(log)
     if vessel is not None or ranges:
-        profile: Profile | None = _chosen([str(log)], vessel, announce)
+        profile: Profile | None = _chosen([path], vessel, announce)
     else:
-        profile = _told(stated_choice([str(log)]), announce)
-    result = inspect_log(str(log), profile, verify=verify, ranges=tuple(ranges))
+        profile = _told(stated_choice([path]), announce)
+    result = inspect_log(path, profile, verify=verify, ranges=tuple(ranges))
     return _outcome(result, render_inspect(result, width))
 
 
@@ -510,7 +529,7 @@ def export(
     from ferryid.export.commands import render_export
 
     result = write_export(
-        str(what), Path(out), to=to, file=file, mcap=mcap, model=model, vessel=vessel, diagnosis=diagnosis,
+        _path(what) if mcap is not None else str(what), Path(out), to=to, file=file, mcap=mcap, model=model, vessel=vessel, diagnosis=diagnosis,
         overwrite=overwrite, json=json, ranges=tuple(ranges), progress=progress, announce=announce,
     )  # fmt: skip
     progress("")
@@ -742,7 +761,7 @@ def new_vessel(
     from ferryid.draft import new_profile
 
     result, text, toml = new_profile(
-        str(log), None if like is None else _profile(like), name=name, file=None if file is None else Path(file),
+        _path(log), None if like is None else _profile(like), name=name, file=None if file is None else Path(file),
         overwrite=overwrite, ask=ask, ranges=tuple(ranges), progress=progress,
     )  # fmt: skip
     return _outcome({**result, "toml": toml}, text)

@@ -13,6 +13,7 @@ from typing import Any
 
 from ferryid.errors import FerryIdError
 from ferryid.ingest import existing_parts
+from ferryid.ingest.remote import copies_folder
 from ferryid.vessel.toml_lines import KeyPath, key_lines, line_of, too_deep
 
 VESSEL_FILE = "vessel.toml"
@@ -84,6 +85,9 @@ def log_folder(log: str) -> Path:
                 path = path.parent
         # The name of a link counts, not what it leads to: settings lie beside what was named.
         path = Path(os.path.abspath(path))
+        if path.is_relative_to(copies_folder()):
+            # Nobody keeps settings beside the copy of a log that lies elsewhere.
+            return Path.cwd()
         return path if path.is_dir() else path.parent
     except (OSError, ValueError):  # whoever opens the log says what is wrong with the path
         return Path.cwd()
