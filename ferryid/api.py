@@ -529,7 +529,8 @@ def export(
     from ferryid.export.commands import render_export
 
     result = write_export(
-        _path(what) if mcap is not None else str(what), Path(out), to=to, file=file, mcap=mcap, model=model, vessel=vessel, diagnosis=diagnosis,
+        str(what) if mcap is None else _path(what), Path(out), to=to,
+        file=file, mcap=mcap, model=model, vessel=vessel, diagnosis=diagnosis,
         overwrite=overwrite, json=json, ranges=tuple(ranges), progress=progress, announce=announce,
     )  # fmt: skip
     progress("")

@@ -72,7 +72,7 @@ def local_logs(log: str) -> list[str]:
         ) from error
     except FileNotFoundError as error:
         cause = error.__cause__
-        if cause is None or isinstance(cause, FileNotFoundError):
+        if cause is None or isinstance(cause, FileNotFoundError) or getattr(cause, "status", None) == 404:
             raise FerryIdError(f"{log}: nothing is there, a log was to be read. Fix: check the URL") from error
         # So fsspec reports a server that does not answer, too.
         raise _not_copied(log, cause) from error

@@ -13,7 +13,7 @@ _TURN = 2.0 * math.pi
 KINDS: Final = MappingProxyType(
     {
         "length": {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "ft": 0.3048, "nmi": 1852.0},
-        "angle": {"rad": 1.0, "deg": math.pi / 180.0, "1e-7 deg": math.pi / 180.0e7},
+        "angle": {"rad": 1.0, "deg": math.pi / 180.0, "degE7": math.pi / 180.0e7},
         "speed": {"m/s": 1.0, "km/h": 1.0 / 3.6, "kn": 1852.0 / 3600.0, "ft/s": 0.3048, "mph": 0.44704},
         "rate": {
             "rad/s": 1.0,
@@ -40,7 +40,7 @@ _SPELLINGS: Final = MappingProxyType(
         "degree": "deg",
         "degrees": "deg",
         "°": "deg",
-        "degE7": "1e-7 deg",
+        "1e-7 deg": "degE7",
         "radian": "rad",
         "radians": "rad",
         "knot": "kn",

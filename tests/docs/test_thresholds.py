@@ -142,6 +142,7 @@ NO_DECISION = {
         signals.quality _MEDIAN_OF
         signals.render _FIELDS_SHOWN
         draft.samples MOST_ROWS
+        draft.autopilots _MOST
         draft.actuator_fields _MOST_SHARED
         diagnose.inference.folds DRAWS
         diagnose.inference.onset_estimation MOST_VALUES

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +12,22 @@ import pytest
 from ferryid.draft import Answers, Draft, draft_profile, draft_text, questions
 from ferryid.errors import FerryIdError
 from ferryid.signals.recording import record
-from ferryid.vessel import check_profile, load_profile
+from ferryid.vessel import check_profile, load_profile, parse_profile
 from tests.draft.test_draft import Columns, sailed
 from tests.ingest.autopilot_logs import DataFlash, ulog
+
+BOAT = """schema = "ferryid.vessel/1"
+name = "boat"
+source = "made up for a test"
+[hull]
+mass_kg = 100.0
+inertia_z = 200.0
+[[actuator]]
+name = "stern"
+kind = "propeller"
+position_m = [-1.0, 0.0]
+thrust = { kind = "quadratic", ahead = 0.01 }
+"""
 
 
 @pytest.fixture(scope="module")
@@ -50,6 +64,7 @@ def px4(trial: Columns, *, actuators: bool = True) -> bytes:
             "vz": zero,
             "heading": heading.astype(np.float32),
         },
+        "vehicle_angular_velocity": {"timestamp": t, "xyz": np.column_stack([zero, zero, single["r"]])},
         "vehicle_attitude_setpoint": {"timestamp": t, "yaw_body": heading.astype(np.float32)},
     }
     if actuators:
@@ -130,6 +145,24 @@ def test_an_answered_draft_is_a_profile_that_reads_its_log(trial: Columns, tmp_p
     np.testing.assert_allclose(columns[order], trial["n"] * scale, atol=2.6)
     if name.endswith("ulg"):
         np.testing.assert_allclose(columns["delta_cmd_motor1"], trial["rudder"] / 0.7 * np.radians(35.0), atol=1e-6)
+
+
+@pytest.mark.parametrize("place", [0, 1])
+def test_the_signal_maps_of_the_page_read_every_such_boat(trial: Columns, tmp_path: Path, place: int) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "formats.md").read_text(encoding="utf-8")
+    text = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)[place]
+    profile = parse_profile(BOAT + text, "boat.toml")
+    log = tmp_path / ("boat.ulg", "boat.bin")[place]
+    log.write_bytes((px4, ardupilot)[place](trial))
+    streams = record(log, profile).streams.values()
+    columns = {name: values for stream in streams for name, values in stream.columns.items()}
+    # Centidegrees of the heading, and the two orders of a motor: 1 for 1000 rpm, and 300 us beyond 25 of dead band.
+    np.testing.assert_allclose(np.cos(columns["psi"] - trial["psi"]), 1.0, atol=2e-7)
+    np.testing.assert_allclose(columns["r"], trial["r"], atol=1e-6)
+    np.testing.assert_allclose(columns["vel_N"], trial["vn"], atol=1e-6)
+    np.testing.assert_allclose(columns["y"], trial["E"], atol=1e-5)
+    pushed = trial["n"] / 1000 if place == 0 else (np.floor(0.3 * trial["n"]) - 25.0) / 375.0
+    np.testing.assert_allclose(columns["n_cmd_stern"], 3000 * np.clip(pushed, -1.0, 1.0), rtol=1e-5)
 
 
 def test_a_log_of_an_autopilot_without_orders_is_one_line(trial: Columns, tmp_path: Path) -> None:

@@ -120,7 +120,7 @@ def test_a_rudder_whose_order_is_a_force_is_a_force_across() -> None:
     assert profile.actuators[0].angle_rad == pytest.approx(math.pi / 2)
 
 
-@pytest.mark.parametrize(("unit", "scale"), [("rad", 1.0), ("deg", 180.0 / math.pi), ("1e-7 deg", 1.8e9 / math.pi)])
+@pytest.mark.parametrize(("unit", "scale"), [("rad", 1.0), ("deg", 180.0 / math.pi), ("degE7", 1.8e9 / math.pi)])
 def test_latitude_and_longitude_in_any_unit(unit: str, scale: float) -> None:
     position = (
         '[signals.position]\ntopic = "/out"\nfields = ["lat", "lon"]\nframe = "geodetic"\n' + f'unit = "{unit}"\n'
