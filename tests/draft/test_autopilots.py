@@ -161,7 +161,7 @@ def test_the_signal_maps_of_the_page_read_every_such_boat(trial: Columns, tmp_pa
     np.testing.assert_allclose(columns["r"], trial["r"], atol=1e-6)
     np.testing.assert_allclose(columns["vel_N"], trial["vn"], atol=1e-6)
     np.testing.assert_allclose(columns["y"], trial["E"], atol=1e-5)
-    pushed = trial["n"] / 1000 if place == 0 else (np.floor(0.3 * trial["n"]) - 25.0) / 375.0
+    pushed = trial["n"] / 1000 if place == 0 else (np.floor(1500.0 + 0.3 * trial["n"]) - 1525.0) / 375.0
     np.testing.assert_allclose(columns["n_cmd_stern"], 3000 * np.clip(pushed, -1.0, 1.0), rtol=1e-5)
 
 
