@@ -152,6 +152,11 @@ def test_inspect_finds_the_signals_and_a_cut_file_is_one_line_or_a_loss(
     assert found["vessel"]["found"].keys() == whole["vessel"]["found"].keys()
     log.write_bytes(log.read_bytes()[:2000])
     run = ferryid("ingest", log, "--vessel", vessel, "--out", tmp_path / "out")
-    assert run.code == 2
-    assert run.err.count("Fix: ") == 1
-    assert not (tmp_path / "out" / "logs").exists()
+    if kind.endswith("mat"):
+        assert run.code == 2
+        assert run.err.count("Fix: ") == 1
+        assert not (tmp_path / "out" / "logs").exists()
+    else:
+        # What of an autopilot's log is there can be read.
+        assert run.code == 0
+        assert "ends within a message: the end of the recording is missing" in run.out
