@@ -11,8 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mcap.writer import CompressionType
-from mcap.writer import Writer as McapWriter
 from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
 from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import CompressionMode, StoragePlugin
@@ -24,6 +22,7 @@ from rosbags.rosbag2.storage_sqlite3 import Sqlite3Writer as Sqlite3Storage
 from ferryid.errors import FerryIdError
 from ferryid.ingest.log import Series
 from ferryid.ingest.row_columns import path_steps
+from ferryid.simulate.mcap_file import McapFile
 from ferryid.simulate.messages import definition, serialised, typestore
 from ferryid.simulate.sensors import Stream
 
@@ -37,8 +36,7 @@ _FOREVER = QosTime(9223372036, 854775807)
 def write_mcap(streams: list[Stream], path: Path, chunk_bytes: int) -> None:
     """Write one MCAP file of CDR messages."""
     with path.open("wb") as file:
-        writer = McapWriter(file, chunk_size=chunk_bytes, compression=CompressionType.ZSTD)
-        writer.start(profile="ros2", library="")
+        writer = McapFile(file, profile="ros2", chunk_bytes=chunk_bytes)
         schemas: dict[str, int] = {}
         channels = []
         for stream in streams:
@@ -48,16 +46,15 @@ def write_mcap(streams: list[Stream], path: Path, chunk_bytes: int) -> None:
             channels.append(writer.register_channel(stream.topic, "cdr", schemas[stream.type]))
         counts = [0] * len(streams)
         for when, index, stamp, data in _in_order(streams, 2):
-            writer.add_message(channels[index], when, data, publish_time=stamp, sequence=counts[index])
+            writer.add_message(channels[index], when, data, stamp_ns=stamp, sequence=counts[index])
             counts[index] += 1
-        writer.finish()  # type: ignore[no-untyped-call]
+        writer.finish()
 
 
 def write_json_mcap(every: Sequence[Series], path: Path) -> None:
     """Write series of fields as one MCAP file of JSON messages, whose paths, times and stamps are those of the series."""
     with path.open("wb") as file:
-        writer = McapWriter(file, compression=CompressionType.ZSTD)
-        writer.start(profile="", library="")
+        writer = McapFile(file)
         schema = writer.register_schema("fields", "jsonschema", b'{"type": "object"}')
         channels = [writer.register_channel(one.topic, "json", schema) for one in every]
         receive = np.concatenate([one.receive_ns for one in every])
@@ -65,8 +62,8 @@ def write_json_mcap(every: Sequence[Series], path: Path) -> None:
         messages = [_json_messages(one) for one in every]
         for place in np.argsort(receive, kind="stable").tolist():
             which, when = int(index[place]), int(receive[place])
-            writer.add_message(channels[which], when, next(messages[which]), publish_time=when)
-        writer.finish()  # type: ignore[no-untyped-call]
+            writer.add_message(channels[which], when, next(messages[which]), stamp_ns=when)
+        writer.finish()
 
 
 def _json_messages(series: Series) -> Iterator[bytes]:

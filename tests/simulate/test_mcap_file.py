@@ -1,0 +1,51 @@
+"""MCAP files are byte for byte those of the package mcap."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from random import Random
+from typing import Any
+
+import pytest
+from mcap.reader import make_reader
+from mcap.writer import CompressionType, Writer
+
+from ferryid.simulate.mcap_file import McapFile
+
+
+def filled(file: Any, publish: str, messages: int) -> None:
+    """Write schemas, channels, some of which stay empty, and messages whose times are in no order."""
+    chance = Random(5)
+    schemas = [file.register_schema(name, "ros2msg", name.encode() * 20) for name in ("pkg/msg/A", "pkg/msg/Größe")]
+    channels = [file.register_channel(f"/topic{k}", "cdr", schemas[k % 2]) for k in range(4)]
+    for number in range(messages):
+        when = 1_600_000_000_000_000_000 + chance.randrange(10**9)
+        data = chance.randbytes(chance.choice((0, 8, 300)))
+        file.add_message(
+            channels[chance.choice((0, 2, 3))], when, data, sequence=number, **{publish: when - chance.randrange(9)}
+        )
+    file.finish()
+
+
+def theirs(target: io.BytesIO, chunk_bytes: int) -> Writer:
+    writer = Writer(target, chunk_size=chunk_bytes, compression=CompressionType.ZSTD)
+    writer.start(profile="ros2", library="")
+    return writer
+
+
+def written(make: Callable[[io.BytesIO], Any], publish: str, messages: int) -> bytes:
+    target = io.BytesIO()
+    filled(make(target), publish, messages)
+    return target.getvalue()
+
+
+@pytest.mark.parametrize("messages", [0, 1, 400])
+@pytest.mark.parametrize("chunk_bytes", [1, 5000, 1 << 20])
+def test_the_bytes_are_those_of_the_package(messages: int, chunk_bytes: int) -> None:
+    ours = written(lambda target: McapFile(target, profile="ros2", chunk_bytes=chunk_bytes), "stamp_ns", messages)
+    assert ours == written(lambda target: theirs(target, chunk_bytes), "publish_time", messages)
+    summary = make_reader(io.BytesIO(ours), validate_crcs=True).get_summary()
+    assert summary is not None
+    assert summary.statistics is not None
+    assert summary.statistics.message_count == messages
