@@ -18,7 +18,7 @@ pytestmark = pytest.mark.slow
 
 NAMES = tuple(list_scenarios())
 SUFFIXES = (".mcap", ".bag", "")
-LOG_S = 480.0
+LOG_S = 300.0
 
 
 @pytest.mark.parametrize("name", NAMES)
