@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import gc
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,18 @@ def shared_data() -> Callable[[str], Path]:
     return locate
 
 
+@pytest.fixture(scope="session", autouse=True)
+def nobody_waits_for_the_disk() -> Iterator[None]:
+    """Sync nothing in this process: every result is synced, which takes minutes in all, and no test cuts the power.
+
+    Where the order of what is synced is tested, calls are noted; processes that tests start do sync.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        # What is no open file is an error still.
+        patch.setattr(os, "fsync", lambda number: os.fstat(number) and None)
+        yield
+
+
 def pytest_collection_modifyitems(items: list[Any]) -> None:
     """Begin with the slow tests, one by one, and keep those together that share fixtures, or are quick, in a file.
 
@@ -39,12 +51,6 @@ def pytest_collection_modifyitems(items: list[Any]) -> None:
     slow = {item.nodeid.partition("::")[0] for item in items if item.get_closest_marker("slow")}
     # Stable: files stay in their order, but that the two that compile most come first: nobody waits for what a worker compiles.
     items.sort(key=lambda item: (_compiles(item), item.nodeid.partition("::")[0] not in slow))
-
-
-def pytest_collection_finish() -> None:
-    """Leave the thousands of collected tests out of every later search for garbage."""
-    gc.collect()
-    gc.freeze()
 
 
 def _compiles(item: Any) -> int:

@@ -524,6 +524,7 @@ def test_a_name_of_bytes_that_are_no_characters(tmp_path: Path) -> None:
     assert again.counts["done_before"] == 2
 
 
+@pytest.mark.usefixtures("here")
 def test_vessels_are_found_for_each_log(tmp_path: Path) -> None:
     logs = archive(tmp_path, 2)
     recipe(tmp_path)

@@ -16,7 +16,7 @@ schema = "ferryid.scenario/1"
 vessel = "milliampere"
 seed = 6
 sensors = { imu_rate_hz = 0.0, camera_rate_hz = 0.0 }
-path = { kind = "twelve-corner", dwell_s = 40 }
+path = { kind = "twelve-corner", dwell_s = 20 }
 controller = { delta = 0.7, sigma = 0.7 }
 [environment.wind]
 north_mps = -2.0

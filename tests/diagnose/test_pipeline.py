@@ -90,7 +90,7 @@ def test_a_thruster_that_gives_up_half_way_and_a_breeze(tmp_path: Path) -> None:
 
 
 def test_gusts_make_a_delay_doubtful(tmp_path: Path) -> None:
-    scenario = one_round("twelve-corner-gusty")
+    scenario = load_scenario("twelve-corner-gusty")
     result = diagnosed(scenario, tmp_path)
     wind = next(one for one in result.findings if one.effect == "wind")
     assert wind.parameters["north"].value == pytest.approx(scenario.wind.north_mps, abs=0.5)
