@@ -162,6 +162,7 @@ def test_the_same_fit_again_is_the_same_model_file(season: Path, tmp_path: Path)
     assert texts[0] == texts[1]
 
 
+@pytest.mark.slow
 def test_what_is_read_is_what_was_kept(season: Path, tmp_path: Path) -> None:
     shutil.copytree(season / "logs", tmp_path / "logs", ignore=shutil.ignore_patterns("windows-*"))
     (folder, *_) = archived_folders(tmp_path, PROFILE)
@@ -184,6 +185,7 @@ def test_what_is_read_is_what_was_kept(season: Path, tmp_path: Path) -> None:
             assert getattr(made, field.name) == getattr(read, field.name), field.name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "hurt",
     [
@@ -214,6 +216,7 @@ def test_what_is_told_of_windows_wrongly_is_made_anew(
     window_store.load_windows(folder, PROFILE, SETTINGS, divided=True)
 
 
+@pytest.mark.slow
 def test_damaged_windows_and_those_of_another_log_are_made_anew(season: Path, tmp_path: Path) -> None:
     shutil.copytree(season / "logs", tmp_path / "logs")
     first, second, _ = archived_folders(tmp_path, PROFILE)

@@ -103,6 +103,7 @@ def test_what_is_told(run: Run) -> None:
     assert "Only 2 folds by whole logs: their scatter, and so the choice, is rough." in found.notes
 
 
+@pytest.mark.slow
 def test_what_makes_no_sense_is_refused(run: Run, tmp_path: Path) -> None:
     log = measured(1, seconds=120.0)
     for what, settings, options, says in (

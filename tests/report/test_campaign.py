@@ -6,6 +6,8 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
+
 from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.report.diagnosis_page import as_text
 from ferryid.report.diagnosis_report import report
@@ -20,6 +22,7 @@ def campaign() -> list[Diagnosis]:
     return [replace(diagnosis("partly_explained", log), findings=(wind(), weak)) for log in ("first", "second")]
 
 
+@pytest.mark.slow
 def test_what_all_logs_share_stands_once(tmp_path: Path) -> None:
     made = report(campaign(), tmp_path)
     text, page = as_text(campaign()), made.report.read_text(encoding="utf-8")
@@ -37,6 +40,7 @@ def test_what_all_logs_share_stands_once(tmp_path: Path) -> None:
     assert [len(one["findings"]) for one in data["logs"]] == [2, 2]
 
 
+@pytest.mark.slow
 def test_what_has_a_figure_stays_with_its_log(tmp_path: Path) -> None:
     made = report(campaign(), tmp_path)
     assert made.report.read_text(encoding="utf-8").count(wind().says) == 2
@@ -44,6 +48,7 @@ def test_what_has_a_figure_stays_with_its_log(tmp_path: Path) -> None:
         assert (made.report.parent / f"{log}-finding-1-evidence.svg").exists()
 
 
+@pytest.mark.slow
 def test_the_model_of_all_logs_stands_once(tmp_path: Path) -> None:
     several = [replace(one, model=str(tmp_path / "models" / "ferry" / "3.json")) for one in campaign()]
     text = " ".join(as_text(several).split())
@@ -53,6 +58,7 @@ def test_the_model_of_all_logs_stands_once(tmp_path: Path) -> None:
     assert page.index("ferry@3") < page.index('id="log-1"')
 
 
+@pytest.mark.slow
 def test_which_logs_take_part_stands_before_all_logs(tmp_path: Path) -> None:
     split, rest = "No common hull fits a on one side and b on the other.", "Current of each log: not confirmed."
     several = [replace(one, notes=(split, rest), gathered=(split,)) for one in campaign()]

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
+
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.second_sources import Comparison, Difference, SecondSources, Witness
 from ferryid.diagnose.second_sources.candidates import Candidate
@@ -42,6 +44,7 @@ FOUND = SecondSources(
 SPIKES = "psi: 51 of 17701 samples were interpolated the wrong way round; removed."
 
 
+@pytest.mark.slow
 def test_the_page_lists_instruments_and_repairs() -> None:
     page, _ = render((replace(diagnosis("explained"), sources=FOUND, repairs=(SPIKES,)),), "trial")
     for shown in ("Other instruments in the log", PLACE.says, "/nav/pose x, y", "0.069 m", WITNESS.says, SPIKES):
@@ -66,6 +69,7 @@ def test_a_terminal_has_one_line_for_each_sender_and_kind() -> None:
     assert len(lines(replace(FOUND, compared=tuple(compared(f"/{k}", "position", PLACE) for k in range(9))))) == 5
 
 
+@pytest.mark.slow
 def test_of_a_campaign_instruments_stand_once(tmp_path: Path) -> None:
     pair = tuple(replace(diagnosis("explained"), log=name, sources=FOUND) for name in ("one", "two"))
     assert render(pair, "trial")[0].count("Other instruments in the log") == 1
@@ -76,6 +80,7 @@ def test_of_a_campaign_instruments_stand_once(tmp_path: Path) -> None:
     assert all("second_sources" not in one for one in plain["logs"])
 
 
+@pytest.mark.slow
 def test_json_has_instruments_and_repairs(tmp_path: Path) -> None:
     plain = report((replace(diagnosis("explained"), sources=FOUND, repairs=(SPIKES,)),), tmp_path).json
     conforms(plain)

@@ -65,6 +65,7 @@ def task(noise: float) -> Task:
     return Task.of(PROFILE, logs)
 
 
+@pytest.mark.slow
 def test_shooting_integrates_the_base_model_along_its_own_motion() -> None:
     coefficients = base_coefficients(task(0.0))
     assert coefficients[FUNCTIONS.index("ur"), 1] == pytest.approx(PROFILE.hull.M[0, 0])
@@ -76,6 +77,7 @@ def test_shooting_integrates_the_base_model_along_its_own_motion() -> None:
     assert right < 0.03 * wrong
 
 
+@pytest.mark.slow
 def test_initial_states_are_found_where_the_first_measurement_of_a_segment_is_wrong() -> None:
     shooting = Shooting(task(0.0))
     states = shooting.segments.states.copy()

@@ -188,6 +188,7 @@ def test_integrator_against_a_tight_adaptive_one(make, waves, tolerance):
     np.testing.assert_allclose(state, exact, rtol=0.0, atol=tolerance)
 
 
+@pytest.mark.slow
 def test_integrator_is_of_fourth_order(adrift):
     # No velocity changes its sign here: |v| has a kink at zero, which would cost an order.
     start, tau = (0.0, 0.0, 0.3, 1.0, 0.4, 0.2), (300.0, 2500.0, 350.0)
