@@ -9,6 +9,7 @@ from ferryid.compare import Coefficient, CommonErrors, ComparedLog, ComparisonRe
 from ferryid.report import comparison_figures, comparison_words
 from ferryid.report.comparison_words import render_effects
 from ferryid.report.html import template
+from ferryid.report.interactive import STATIC, Interactive
 from ferryid.report.structure import worst_minute
 
 MAX_LOGS = 6
@@ -16,7 +17,10 @@ MAX_LOGS = 6
 
 
 def render(
-    result: ComparisonResult, logs: Sequence[ComparedLog], made: Mapping[str, str]
+    result: ComparisonResult,
+    logs: Sequence[ComparedLog],
+    made: Mapping[str, str],
+    interactive: Interactive = STATIC,
 ) -> tuple[str, dict[str, str]]:
     """Return the page and its drawings (SVG) by name; `made` are date, version and command."""
     known = comparison_words.scopes(result)
@@ -30,7 +34,7 @@ def render(
     overall = _overall(result, shown, reference) if shown else []
     sections: list[dict[str, Any]] = []
     for on, title, scope in ordered:
-        log = next((one for one in logs[:MAX_LOGS] if one.name == on), None)
+        place = next((k for k, one in enumerate(logs[:MAX_LOGS]) if one.name == on), None)
         sections.append(
             {
                 "title": title,
@@ -40,13 +44,15 @@ def render(
                 "sentences": comparison_words.sentences(result, on),
                 "tracking": comparison_words.tracking_line(scope),
                 "warnings": comparison_words.warnings_of(scope),
-                "figures": _figures(result, log) if log is not None else [],
+                "timeline": 0 if place is None else interactive.number(place),
+                "figures": _figures(result, logs[place]) if place is not None else [],
             }
         )
     page = template("compare.html").render(
         title=" · ".join([result.vessel, *(model.label for model in result.models if not model.is_base)]),
         headline=comparison_words.headline(result),
         made=made,
+        assets=interactive.assets,
         warnings=result.warnings,
         models=[(model.label, comparison_words.model_line(model)) for model in result.models],
         overall=overall,
@@ -87,7 +93,7 @@ def _overall(
     return figures
 
 
-def _figures(result: ComparisonResult, log: ComparedLog) -> list[dict[str, str]]:
+def _figures(result: ComparisonResult, log: ComparedLog) -> list[dict[str, Any]]:
     start = worst_minute(log.motion, log.taus, log.rows, comparison_figures.MINUTE_S)
     which = "This log" if start is None else f"The minute in which the models err most, from {start:.0f} s"
     return [
@@ -95,6 +101,7 @@ def _figures(result: ComparisonResult, log: ComparedLog) -> list[dict[str, str]]
             "file": f"forces-{log.name}" + ("" if start is None else "-worst-minute"),
             "svg": comparison_figures.forces(result, log, start),
             "caption": f"{which}: force measured at the actuators, and what each model makes of the same motion.",
+            "over_time": True,
         }
     ]
 

@@ -9,9 +9,12 @@ from pathlib import Path
 
 from ferryid.compare import Coefficient, CommonErrors, Comparison, ComparisonResult
 from ferryid.report import comparison_words
-from ferryid.report.comparison_page import render
+from ferryid.report.comparison_figures import looks
+from ferryid.report.comparison_page import MAX_LOGS, render
 from ferryid.report.comparison_words import render_effects
+from ferryid.report.fit_timeline import comparison_timeline
 from ferryid.report.folder import PAGE, made, write_folder
+from ferryid.report.interactive import make_interactive
 from ferryid.report.outcome import Report
 
 NARROW = 3
@@ -34,8 +37,11 @@ def report(comparison: Comparison, out: Path, command: Sequence[str] = ()) -> Re
     folder = out / "reports" / _folder(result)
     file = folder / PAGE
     plain = {**result.to_json(), "report": str(file)}
-    page, drawings = render(result, comparison.logs, made(command))
-    write_folder(folder, page, drawings, plain, "compare.json")
+    look = looks(result.models)
+    timelines = {k: comparison_timeline(log, result.models, look) for k, log in enumerate(comparison.logs[:MAX_LOGS])}
+    interactive = make_interactive(timelines, folder, out)
+    page, drawings = render(result, comparison.logs, made(command), interactive)
+    write_folder(folder, page, drawings, plain, "compare.json", scripts=interactive.files())
     return Report(plain, f"{as_text(result)}\n\nreport  {file}", file)
 
 

@@ -23,6 +23,7 @@ from ferryid.report import (
 )
 from ferryid.report.campaign import TEXT_COLUMNS
 from ferryid.report.html import template
+from ferryid.report.interactive import STATIC, Interactive
 from ferryid.report.left_out import left_out_table
 from ferryid.signals.track import LeftOut
 from ferryid.types import AXES, Floats
@@ -33,7 +34,10 @@ UNITS = ("[N]", "[N]", "[N·m]")
 
 
 def render(
-    diagnoses: Sequence[Diagnosis], title: str, made: Mapping[str, str] | None = None
+    diagnoses: Sequence[Diagnosis],
+    title: str,
+    made: Mapping[str, str] | None = None,
+    interactive: Interactive = STATIC,
 ) -> tuple[str, dict[str, str]]:
     """Return the page on one log or several, and its drawings (SVG) by name; `made` are date, version and command."""
     several = len(diagnoses) > 1
@@ -41,7 +45,13 @@ def render(
     gathered = [note for note in shared if note in diagnoses[0].gathered]
     common = diagnosis_words.findings_of_all(diagnoses)
     together = second_sources.of_all(diagnoses)
-    logs = [_log(one, f"{k}-" if several else "", k <= MAX_LOGS, shared, common) for k, one in enumerate(diagnoses, 1)]
+    logs = [
+        {
+            **_log(one, f"{k + 1}-" if several else "", k < MAX_LOGS, shared, common),
+            "timeline": interactive.number(k),
+        }
+        for k, one in enumerate(diagnoses)
+    ]
     left = [one.log for one in diagnoses[MAX_LOGS:]]
     of_campaign = campaign.section(diagnoses) if several else {}
     of_all = likeness.section(diagnoses[0].likeness_of_all, "likeness", "these logs together")
@@ -61,6 +71,7 @@ def render(
         shared_sources=second_sources.section(together) if together else {},
         shared_model=diagnosis_words.model_of_all(diagnoses),
         axes=list(zip(AXES, UNITS, strict=True)),
+        assets=interactive.assets,
         omitted=f"Not drawn, but part of every number: {', '.join(left)}." if left else "",
     )
     drawings = {
@@ -188,7 +199,7 @@ def _log(
         "intervals": any(" to " in cell for row in (*force_rows, *free_run_rows) for cell in row["cells"]),
         "free_run_note": diagnosis.before.get("free_run", {}).get("note", ""),
         "figures": [
-            {"file": f"{prefix}{name}", "svg": svg, "caption": caption}
+            {"file": f"{prefix}{name}", "svg": svg, "caption": caption, "over_time": name == "left-over"}
             for name, svg, caption in (diagnosis_figures.figures_of(diagnosis) if drawn else ())
         ],
         "withheld": [

@@ -23,9 +23,11 @@ from ferryid.files import finite
 from ferryid.models import Model
 from ferryid.models.store import load
 from ferryid.report import second_sources
-from ferryid.report.diagnosis_page import as_text, render
+from ferryid.report.diagnosis_page import MAX_LOGS, as_text, render
+from ferryid.report.diagnosis_timeline import timelines
 from ferryid.report.diagnosis_words import findings_of, findings_of_all
 from ferryid.report.folder import PAGE, made, write_folder
+from ferryid.report.interactive import make_interactive
 from ferryid.report.outcome import Report
 from ferryid.types import AXES, RunContext
 from ferryid.vessel import load_profile, parse_profile
@@ -88,13 +90,16 @@ def diagnose_and_report(
     """
     diagnoses = diagnose_and_store(logs, profile, settings, run, name=name)
     run.progress("writing the report")
-    return report(diagnoses, run.out, command)
+    return report(diagnoses, run.out, command, run.tables_out)
 
 
-def report(diagnoses: Sequence[Diagnosis], out: Path, command: Sequence[str] = ()) -> Report:
+def report(
+    diagnoses: Sequence[Diagnosis], out: Path, command: Sequence[str] = (), shared: Path | None = None
+) -> Report:
     """Write page, figures and JSON to a folder of their own in ``reports``; a later diagnosis of the same logs replaces it.
 
-    `command` are the words that the diagnosis was asked for with; the page repeats them.
+    `command` are the words that the diagnosis was asked for with; the page repeats them. `shared` is the output folder that
+    keeps the scripts of the interactive figures, where that is another than `out`.
 
     Raises
     ------
@@ -105,10 +110,11 @@ def report(diagnoses: Sequence[Diagnosis], out: Path, command: Sequence[str] = (
     names = ", ".join(one.log for one in diagnoses[:2]) + (
         f" and {len(diagnoses) - 2} more" if len(diagnoses) > 2 else ""
     )
-    page, drawings = render(diagnoses, f"{diagnoses[0].vessel} · {names}", made(command))
+    interactive = make_interactive(timelines(diagnoses, MAX_LOGS), folder, shared or out)
+    page, drawings = render(diagnoses, f"{diagnoses[0].vessel} · {names}", made(command), interactive)
     file = folder / PAGE
     plain = {**finite(as_json(diagnoses)), "report": str(file)}
-    write_folder(folder, page, drawings, plain, "diagnosis.json")
+    write_folder(folder, page, drawings, plain, "diagnosis.json", scripts=interactive.files())
     return Report(plain, f"{as_text(diagnoses)}\nreport  {file}", file)
 
 

@@ -13,10 +13,12 @@ from ferryid.files import alone
 from ferryid.identify import FitOutcome, FitSettings, fit_archive, fit_logs
 from ferryid.models import model_to_json
 from ferryid.models.store import StoredModel, assign_version, plan, save
+from ferryid.report.fit_timeline import fit_timeline
 from ferryid.report.folder import PAGE, write_folder
+from ferryid.report.interactive import make_interactive
 from ferryid.report.model_text import describe_settings
 from ferryid.report.outcome import Report
-from ferryid.report.page import headline, render
+from ferryid.report.page import MAX_LOGS, headline, render
 from ferryid.report.tables import tables_of
 from ferryid.types import AXES, RunContext
 from ferryid.vessel.profile import Profile
@@ -91,10 +93,12 @@ def _reported(result: FitOutcome, run: RunContext) -> FitReport:
     with alone(out / "models"):
         result = replace(result, model=assign_version(result.model, out))
         folder = out / "reports" / f"{result.model.name}-v{result.model.version}"
-        page, drawings = render(result)
+        timelines = {k: fit_timeline(log) for k, log in enumerate(result.logs[:MAX_LOGS])}
+        interactive = make_interactive(timelines, folder, run.tables_out or out)
+        page, drawings = render(result, interactive)
         stored = plan(result.model, out)
         plain = as_json(result, stored, folder / PAGE)
-        write_folder(folder, page, drawings, plain, "fit.json", last=lambda: save(result.model, out))
+        write_folder(folder, page, drawings, plain, "fit.json", lambda: save(result.model, out), interactive.files())
     run.progress("")
     report = folder / PAGE
     return FitReport(plain, as_text(result, stored, report), report, stored)

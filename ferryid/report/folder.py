@@ -27,6 +27,7 @@ def write_folder(
     plain: Mapping[str, Any],
     name: str,
     last: Callable[[], object] = lambda: None,
+    scripts: Mapping[str, str] | None = None,
 ) -> None:
     """Write a report in place of an earlier one of that folder.
 
@@ -40,6 +41,8 @@ def write_folder(
         The result, and the name of its JSON file.
     last
         Done before the report takes its place: a full disk or an interrupt leaves neither without the other.
+    scripts
+        Data of the interactive figures, by file name.
 
     Raises
     ------
@@ -48,7 +51,7 @@ def write_folder(
     """
     with replacing(folder) as temporary:
         temporary.mkdir()
-        files = {PAGE: page, **{f"{key}.svg": drawing for key, drawing in drawings.items()}}
+        files = {PAGE: page, **{f"{key}.svg": drawing for key, drawing in drawings.items()}, **(scripts or {})}
         for file, text in files.items():
             (temporary / file).write_text(text, encoding="utf-8", errors="backslashreplace")
         (temporary / name).write_text(dump_json(plain), encoding="utf-8")

@@ -13,6 +13,7 @@ from ferryid.models import RANGE_UNITS, ForceScores
 from ferryid.models.forces import effective_mass
 from ferryid.report import figures
 from ferryid.report.html import template
+from ferryid.report.interactive import STATIC, Interactive
 from ferryid.report.left_out import left_out_table
 from ferryid.report.structure import remainder, worst_and_best_minute
 from ferryid.types import AXES, Floats
@@ -23,9 +24,9 @@ MAX_LOGS = 6
 """Logs whose forces are drawn; the page stays below ten megabytes and readable."""
 
 
-def render(result: FitOutcome) -> tuple[str, dict[str, str]]:
+def render(result: FitOutcome, interactive: Interactive = STATIC) -> tuple[str, dict[str, str]]:
     """Return the report of a fit as HTML with the drawings inside, and the drawings (SVG) by name."""
-    context = _context(result)
+    context = _context(result, interactive)
     return template("fit.html").render(context), dict(_drawings(context))
 
 
@@ -66,7 +67,7 @@ def headline(result: FitOutcome) -> str:
 _HOLDS = {True: "yes", False: "no", None: "not known"}
 
 
-def _context(result: FitOutcome) -> dict[str, Any]:
+def _context(result: FitOutcome, interactive: Interactive) -> dict[str, Any]:
     model, verdict = result.model, result.acceptance
     drawn = result.logs[:MAX_LOGS]
     left = [log.motion.log for log in result.logs[MAX_LOGS:]]
@@ -96,7 +97,11 @@ def _context(result: FitOutcome) -> dict[str, Any]:
         "axes": AXES,
         "score_rows": _score_rows(result.scores.force),
         "split_notes": result.scores.split_notes,
-        "logs": [{"name": log.motion.log, "figures": _force_figures(log)} for log in drawn],
+        "logs": [
+            {"name": log.motion.log, "figures": _force_figures(log), "timeline": interactive.number(k)}
+            for k, log in enumerate(drawn)
+        ],
+        "assets": interactive.assets,
         "omitted": f"Not drawn, but part of every number: {', '.join(left)}." if left else "",
         "free_run_notes": [
             f"{who}: {run.note}."
@@ -196,13 +201,14 @@ def _score_rows(scores: ForceScores) -> list[dict[str, Any]]:
     ]
 
 
-def _force_figures(log: LogFit) -> list[dict[str, str]]:
-    shown = [
+def _force_figures(log: LogFit) -> list[dict[str, Any]]:
+    shown: list[dict[str, Any]] = [
         {
             "file": f"forces-{log.motion.log}",
             "svg": figures.forces(log),
             "caption": "Applied force as measured at the actuators, and as each model estimates it from the motion. "
             "Shaded: validation, which the new model did not see, and what is left out.",
+            "over_time": True,
         }
     ]
     minutes = worst_and_best_minute(log)
@@ -213,6 +219,7 @@ def _force_figures(log: LogFit) -> list[dict[str, str]]:
                     "file": f"forces-{log.motion.log}-{word}-minute",
                     "svg": figures.forces(log, start, start + 60.0),
                     "caption": f"The {word} minute of the new model, from {start:.0f} s.",
+                    "over_time": True,
                 }
             )
     return shown

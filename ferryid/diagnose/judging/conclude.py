@@ -156,7 +156,7 @@ def _too_short(
         before,
         after,
         (*survey_notes(screened), *noted, short, *notes),
-        evidence={} if errors is None else _leftover(errors.windows, errors.before, errors.after),
+        evidence=_measured(log.windows) if errors is None else _leftover(errors.windows, errors.before, errors.after),
         duration_s=_duration_s(screened),
         left_out=screened.measured.survey.motion.left_out,
         remainder=remainder,
@@ -308,12 +308,23 @@ def _joined(
 
 
 def _leftover(windows: Windows, before: Floats, after: Floats) -> dict[str, Any]:
-    psi = windows.mean(windows.measurements.psi[:, None])[:, 0]
-    speed = windows.mean(np.hypot(windows.measurements.nu[:, 0], windows.measurements.nu[:, 1])[:, None])[:, 0]
+    return {**_measured(windows), "before": before, "after": after}
+
+
+def _measured(windows: Windows) -> dict[str, Any]:
+    """Return what was measured in every window, for figures; nothing where there is no window."""
+    if not len(windows.starts):
+        return {}
+    measurements = windows.measurements
+    psi = windows.mean(measurements.psi[:, None])[:, 0]
+    speed = windows.mean(np.hypot(measurements.nu[:, 0], measurements.nu[:, 1])[:, None])[:, 0]
+    flows = {"wind": measurements.wind, "current": measurements.current}
     return {
         "t": windows.middle_s,
-        "before": before,
-        "after": after,
         "heading": np.degrees(np.mod(psi, 2.0 * np.pi)),
         "speed": speed,
+        "place": windows.mean(measurements.eta[:, :2]),
+        "nu": windows.mean(measurements.nu),
+        "thrust": windows.mean(measurements.parts.sum(axis=1)),
+        **{name: windows.mean(flow) for name, flow in flows.items() if flow is not None},
     }

@@ -93,7 +93,9 @@ class Diagnosis:
         Path of the model with the findings in it.
     evidence
         What was left over in the whole log, one row a window: ``t`` [s], shape (m,); ``before``, ``after`` [N, N, N·m],
-        shape (m, 3); optionally ``heading`` [deg] and ``speed`` [m/s], shape (m,).
+        shape (m, 3); optionally what was measured, ``heading`` [deg] and ``speed`` [m/s], shape (m,), ``place`` north and
+        east [m], ``wind`` and ``current``, where they go to [m/s], shape (m, 2), ``nu`` [m/s, m/s, rad/s] and ``thrust``
+        [N, N, N·m], shape (m, 3). Of a log that is too short, only these.
     withheld
         Signals that were hidden from the diagnosis.
     against

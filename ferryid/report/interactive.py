@@ -1,0 +1,114 @@
+"""Interactive figures of a page: its timelines, and the scripts and styles that show them.
+
+Scripts lie once per output folder in ``reports/assets/KEY``, beside the folders of the pages.
+
+The key is of their content, so that pages of another version of ferryid keep the scripts that they were written with.
+uPlot draws the lines: 50 kB, MIT licence, which lies beside it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+from ferryid.errors import UnwritableError
+from ferryid.files import replacing
+from ferryid.report.timeline import Timeline, scripts
+
+SCRIPTS = ("uplot.js", "theme.js", "decode.js", "map.js", "strips.js", "timeline.js")
+"""In the order in which a page loads them."""
+STYLES = ("uplot.css", "timeline.css")
+LICENCE = "uplot-LICENSE.txt"
+
+
+@cache
+def _contents() -> tuple[str, dict[str, bytes]]:
+    """Return the key and the contents of every file by name."""
+    folder = files("ferryid.report") / "static"
+    contents = {name: (folder / name).read_bytes() for name in (*SCRIPTS, *STYLES, LICENCE)}
+    digest = hashlib.sha256()
+    for name, content in contents.items():
+        digest.update(name.encode() + b"\0" + content)
+    return digest.hexdigest()[:12], contents
+
+
+@dataclass(frozen=True)
+class Interactive:
+    """What a page shows interactively, beside its static figures.
+
+    Attributes
+    ----------
+    timelines
+        By the place of their log on the page, from 0.
+    place
+        Address of the folder of the scripts as the page links to it.
+    """
+
+    timelines: Mapping[int, Timeline] = field(default_factory=dict)
+    place: str = ""
+
+    def number(self, log: int) -> int:
+        """Return which timeline is a log's, from 1; 0 where it has none."""
+        return list(self.timelines).index(log) + 1 if log in self.timelines else 0
+
+    @property
+    def assets(self) -> dict[str, list[str]]:
+        """Addresses of scripts and styles; empty without timelines."""
+        if not self.timelines:
+            return {}
+        return {
+            "scripts": [f"{self.place}/{name}" for name in SCRIPTS],
+            "styles": [f"{self.place}/{name}" for name in STYLES],
+        }
+
+    def files(self) -> dict[str, str]:
+        """Return the data beside the page, by file name."""
+        return scripts(list(self.timelines.values()))
+
+
+STATIC = Interactive()
+"""A page without interactive figures."""
+
+
+def make_interactive(timelines: Mapping[int, Timeline | None], folder: Path, out: Path) -> Interactive:
+    """Return what the page in a folder shows, and write its scripts to the output folder.
+
+    Raises
+    ------
+    FerryIdError
+        For a folder that cannot be written; nothing half-written is left.
+    """
+    made = {log: one for log, one in timelines.items() if one is not None}
+    if not made:
+        return STATIC
+    key, _ = _contents()
+    write_assets(out)
+    return Interactive(made, os.path.relpath(out / "reports" / "assets" / key, folder).replace(os.sep, "/"))
+
+
+def write_assets(out: Path) -> None:
+    """Write the scripts of an output folder where they are not there yet.
+
+    Raises
+    ------
+    FerryIdError
+        For a folder that cannot be written; nothing half-written is left.
+    """
+    key, contents = _contents()
+    folder = out / "reports" / "assets" / key
+    if folder.is_dir():
+        return
+    try:
+        with replacing(folder) as temporary:
+            temporary.mkdir()
+            for name, content in contents.items():
+                (temporary / name).write_bytes(content)
+    except UnwritableError:
+        # Another process may have written the same meanwhile.
+        if not folder.is_dir():
+            raise

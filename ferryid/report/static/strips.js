@@ -1,0 +1,204 @@
+/* Axes below one another with one time axis: uPlot draws each, this links them, shades, and follows pointer and fingers. */
+"use strict";
+(function () {
+  const el = ferryid.element;
+  const left = 74; /* width of the vertical axes, alike in all strips [px] */
+
+  function axis(more) {
+    return {
+      stroke: () => ferryid.colour("ink"),
+      grid: { stroke: () => ferryid.colour("grid"), width: 1 },
+      ticks: { stroke: () => ferryid.colour("grid"), width: 1 },
+      ...more,
+    };
+  }
+
+  function series(trace) {
+    return {
+      label: trace.label,
+      show: trace.shown,
+      auto: trace.framing,
+      stroke: () => ferryid.colour(trace.colour),
+      width: trace.colour === "measured" ? 1.8 : 1.3,
+      dash: trace.dash,
+      points: { show: false },
+      spanGaps: false,
+    };
+  }
+
+  ferryid.Strips = class {
+    constructor(plain, state) {
+      this.plain = plain;
+      this.state = state;
+      this.pan = false;
+      this.root = el("div", { class: "strips" });
+      this.rows = plain.strips.map((strip, k) => this.strip(strip, k));
+      state.redraw.push(() => this.follow());
+      state.pointed.push(() => this.cursor());
+      ferryid.themed.push(() => this.rows.forEach((row) => row.plot && row.plot.redraw(false)));
+    }
+
+    strip(strip, k) {
+      const values = el("div", { class: "switches" });
+      const outputs = strip.traces.map((trace) => {
+        const box = el("input", { type: "checkbox", checked: trace.shown, "data-trace": trace.label });
+        const output = el("output", {}, "");
+        box.addEventListener("change", () => this.state.show(trace.label, box.checked));
+        const swatch = el("span", { class: "swatch" + (trace.dash.length ? " dashed" : ""), style: "--of: var(--" + trace.colour + ")" });
+        values.append(el("label", {}, box, swatch, trace.label + " ", output));
+        return output;
+      });
+      const drawing = el("div", { class: "drawing", role: "img", "aria-label": strip.label + " over time" });
+      this.root.append(el("div", { class: "strip" }, el("div", { class: "head" }, el("strong", {}, strip.label), values), drawing));
+      return { strip, k, outputs, drawing, values, plot: null };
+    }
+
+    /* Draw for the first time: only now are the widths known. */
+    open() {
+      this.rows.forEach((row) => {
+        const last = row.k === this.rows.length - 1;
+        const options = {
+          width: row.drawing.clientWidth,
+          height: this.height(last),
+          legend: { show: false },
+          cursor: {
+            sync: { key: this.state.key, setSeries: false },
+            drag: { x: true, y: false, setScale: false },
+            bind: { dblclick: () => () => this.state.see(...this.state.whole) },
+          },
+          scales: { x: { time: false, min: this.state.from, max: this.state.to, auto: false } },
+          axes: [axis({ size: last ? 44 : 14, label: last ? "time [s]" : undefined, labelSize: 16, values: last ? undefined : () => [] }), axis({ size: left, space: 26 })],
+          series: [{}, ...row.strip.traces.map(series)],
+          hooks: {
+            drawClear: [(plot) => this.shade(plot)],
+            setSelect: [(plot) => this.selected(plot)],
+            setCursor: [(plot) => this.moved(row, plot)],
+          },
+        };
+        row.plot = new uPlot(options, [this.state.data.t, ...this.state.data.strips[row.k]], row.drawing);
+        this.listen(row.plot);
+      });
+      new ResizeObserver(() => this.rows.forEach((row) => this.resize(row))).observe(this.root);
+    }
+
+    height(last) {
+      return (this.rows.length > 3 ? 120 : 150) + (last ? 44 : 14);
+    }
+
+    resize(row) {
+      const width = row.drawing.clientWidth;
+      if (width && width !== row.plot.width) row.plot.setSize({ width, height: this.height(row.k === this.rows.length - 1) });
+    }
+
+    /* Take over view, data and which traces are shown. */
+    follow() {
+      this.rows.forEach((row) => {
+        if (!row.plot) return;
+        row.plot.batch(() => {
+          if (row.drawn !== this.state.data) row.plot.setData([this.state.data.t, ...this.state.data.strips[row.k]], false);
+          row.drawn = this.state.data;
+          row.strip.traces.forEach((trace, i) => {
+            const shown = !this.state.hidden.has(trace.label);
+            if (row.plot.series[i + 1].show !== shown) row.plot.setSeries(i + 1, { show: shown });
+            row.values.querySelectorAll("input")[i].checked = shown;
+          });
+          row.plot.setScale("x", { min: this.state.from, max: this.state.to });
+        });
+      });
+    }
+
+    shade(plot) {
+      const { ctx, bbox } = plot;
+      const stretch = (first, last, role) => {
+        const a = Math.max(plot.valToPos(first, "x", true), bbox.left);
+        const b = Math.min(plot.valToPos(last, "x", true), bbox.left + bbox.width);
+        if (b < bbox.left || a > bbox.left + bbox.width) return;
+        ctx.fillStyle = ferryid.colour(role);
+        ctx.fillRect(a, bbox.top, Math.max(b - a, 1), bbox.height);
+      };
+      ctx.save();
+      this.plain.spans.forEach((span) => stretch(span.first, span.last, span.kind));
+      const chosen = this.plain.marks[this.state.mark];
+      ctx.globalAlpha = 0.6;
+      if (chosen) chosen.spans.forEach(([first, last]) => stretch(first, last, "acts"));
+      ctx.restore();
+    }
+
+    selected(plot) {
+      const { left: from, width } = plot.select;
+      if (width < 4) return;
+      const ends = [plot.posToVal(from, "x"), plot.posToVal(from + width, "x")];
+      plot.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+      this.state.see(...ends);
+    }
+
+    moved(row, plot) {
+      const k = plot.cursor.idx;
+      row.outputs.forEach((output, i) => {
+        output.textContent = k === null || k === undefined ? "" : ferryid.text(plot.data[i + 1][k]);
+      });
+      /* The strip under the pointer, or the one that was set by hand, moves the vessel on the map. */
+      if (row.k === 0) this.state.follow(k === null || k === undefined ? null : plot.data[0][k]);
+    }
+
+    /* Put the cursor at a time. */
+    cursor() {
+      this.rows.forEach(({ plot }) => {
+        if (plot) plot.setCursor({ left: plot.valToPos(this.state.asked, "x"), top: plot.over.clientHeight / 2 }, true, false);
+      });
+    }
+
+    listen(plot) {
+      const over = plot.over;
+      over.style.touchAction = "pan-y";
+      const time = (x) => plot.posToVal(x - over.getBoundingClientRect().left, "x");
+      const held = new Map();
+      let start = null;
+      over.addEventListener(
+        "mousedown",
+        (event) => {
+          if (this.pan || event.shiftKey) event.stopImmediatePropagation();
+        },
+        true,
+      );
+      over.addEventListener("pointerdown", (event) => {
+        const touch = event.pointerType === "touch";
+        if (!touch && !this.pan && !event.shiftKey) return;
+        over.setPointerCapture(event.pointerId);
+        held.set(event.pointerId, event.clientX);
+        start = { at: [...held.values()], from: this.state.from, to: this.state.to };
+      });
+      over.addEventListener("pointermove", (event) => {
+        if (!held.has(event.pointerId)) return;
+        held.set(event.pointerId, event.clientX);
+        const now = [...held.values()];
+        const perPixel = (start.to - start.from) / over.clientWidth;
+        if (now.length === 1) {
+          const moved = (start.at[0] - now[0]) * perPixel;
+          this.state.see(start.from + moved, start.to + moved);
+        } else if (now.length === 2 && start.at.length === 2) {
+          const ratio = Math.abs(start.at[1] - start.at[0]) / Math.max(Math.abs(now[1] - now[0]), 8);
+          const middle = 0.5 * (start.from + start.to);
+          const half = 0.5 * (start.to - start.from) * ratio;
+          this.state.see(middle - half, middle + half);
+        }
+      });
+      const release = (event) => held.delete(event.pointerId);
+      over.addEventListener("pointerup", release);
+      over.addEventListener("pointercancel", release);
+      over.addEventListener(
+        "wheel",
+        (event) => {
+          if (event.ctrlKey || event.metaKey) {
+            event.preventDefault();
+            this.state.zoom(Math.exp(-0.002 * event.deltaY), time(event.clientX));
+          } else if (event.shiftKey) {
+            event.preventDefault();
+            this.state.shift(((event.deltaX || event.deltaY) / over.clientWidth) * 1.0);
+          }
+        },
+        { passive: false },
+      );
+    }
+  };
+})();

@@ -1,0 +1,194 @@
+/* Interactive figures of a log: state of the view, its controls and keys, and the rows that are loaded when a reader zooms in. */
+"use strict";
+(function () {
+  const el = ferryid.element;
+  const shortest = 20; /* rows that a view shows at least */
+  const most = 200000; /* rows in view, above which the overview is drawn */
+  const all = [];
+
+  class Timeline {
+    constructor(plain, number, section) {
+      this.plain = plain;
+      this.key = "ferryid-" + number;
+      this.data = this.overview = ferryid.decode(plain, plain.data);
+      this.rows = null;
+      const t = this.data.t;
+      this.whole = [t[0], t[t.length - 1]];
+      [this.from, this.to] = this.whole;
+      this.cursorAt = null;
+      this.asked = null;
+      this.mark = -1;
+      this.hidden = new Set();
+      plain.strips.forEach((strip) => strip.traces.forEach((trace) => trace.shown || this.hidden.add(trace.label)));
+      this.redraw = [];
+      this.pointed = [];
+      this.section = section;
+      this.build();
+    }
+
+    get cursor() {
+      return this.cursorAt;
+    }
+
+    build() {
+      const button = (text, title, act, more) => el("button", { type: "button", title, "aria-label": title, onclick: act, ...more }, text);
+      this.range = el("output", { class: "range" }, "");
+      this.live = el("p", { class: "live", "aria-live": "polite" }, "");
+      this.strips = new ferryid.Strips(this.plain, this);
+      this.map = this.plain.place ? new ferryid.Map(this.plain, this) : null;
+      const pan = button("drag: zoom", "whether dragging zooms or moves the time axis", () => {
+        this.strips.pan = !this.strips.pan;
+        pan.textContent = this.strips.pan ? "drag: move" : "drag: zoom";
+        pan.setAttribute("aria-pressed", this.strips.pan);
+        this.section.classList.toggle("pan", this.strips.pan);
+      });
+      const tools = el(
+        "div",
+        { class: "tools", role: "toolbar", "aria-label": "time axis" },
+        button("+", "zoom in", () => this.zoom(2)),
+        button("−", "zoom out", () => this.zoom(0.5)),
+        button("◀", "earlier", () => this.shift(-0.5)),
+        button("▶", "later", () => this.shift(0.5)),
+        button("whole log", "show the whole log", () => this.jump(-1)),
+        pan,
+        this.range,
+        ferryid.themeButton(),
+      );
+      this.marks = this.plain.marks.map((mark, k) => {
+        const where = mark.spans.length ? mark.spans[0].map((one) => one.toFixed(0)).join(" to ") + " s" : "whole log";
+        const more = mark.spans.length > 1 ? ", " + mark.spans.length + " times" : "";
+        return button(k + 1 + ". " + mark.title + " · " + where + more, "show when " + mark.title + " acts", () => this.jump(k), {
+          "aria-pressed": "false",
+        });
+      });
+      const findings = this.marks.length ? el("div", { class: "tools findings", role: "toolbar", "aria-label": "findings" }, ...this.marks) : "";
+      const kinds = new Map(this.plain.spans.map((span) => [span.kind, span.label]));
+      if (this.plain.marks.some((mark) => mark.spans.length)) kinds.set("acts", "chosen stretch");
+      const shades = el("div", { class: "switches" }, ...[...kinds].map(([kind, label]) => el("span", {}, el("span", { class: "swatch area", style: "--of: var(--" + kind + ")" }), label)));
+      const help = el(
+        "details",
+        { class: "keys" },
+        el("summary", {}, "keys"),
+        el("p", {}, "← → cursor · Shift with ← → earlier, later · + − zoom · 0 whole log · 1 to 9 findings · Ctrl with the wheel zooms · Shift with the wheel or dragging moves · double click: whole log"),
+      );
+      this.section.append(tools, findings, shades, el("div", { class: this.map ? "both" : "" }, this.strips.root, this.map ? this.map.root : ""), this.live, help);
+      this.section.hidden = false;
+      this.section.tabIndex = 0;
+      this.section.addEventListener("keydown", (event) => this.pressed(event));
+      this.strips.open();
+      this.strips.follow();
+      this.say();
+    }
+
+    /* Show a stretch of time. */
+    see(from, to) {
+      const [first, last] = this.whole;
+      const t = (this.rows || this.overview).t;
+      const least = Math.min(((last - first) / Math.max(t.length - 1, 1)) * shortest, last - first);
+      let width = Math.min(Math.max(to - from, least), last - first);
+      const middle = 0.5 * (from + to);
+      from = Math.min(Math.max(middle - 0.5 * width, first), last - width);
+      [this.from, this.to] = [from, from + width];
+      this.level();
+      this.changed();
+    }
+
+    zoom(factor, about) {
+      const pivot = about === undefined ? (this.cursor !== null && this.cursor > this.from && this.cursor < this.to ? this.cursor : 0.5 * (this.from + this.to)) : about;
+      this.see(pivot - (pivot - this.from) / factor, pivot + (this.to - pivot) / factor);
+    }
+
+    shift(share) {
+      const by = share * (this.to - this.from);
+      this.see(this.from + by, this.to + by);
+    }
+
+    jump(k) {
+      this.mark = k;
+      this.marks.forEach((button, i) => button.setAttribute("aria-pressed", String(i === k)));
+      const mark = this.plain.marks[k];
+      if (mark && mark.trace) this.hidden.delete(mark.trace);
+      if (!mark || !mark.spans.length) this.see(...this.whole);
+      else {
+        const first = Math.min(...mark.spans.map((span) => span[0]));
+        const last = Math.max(...mark.spans.map((span) => span[1]));
+        const room = 0.15 * (last - first) + 5;
+        this.see(first - room, last + room);
+      }
+      this.live.textContent = mark ? "Shown: " + this.marks[k].textContent + "." : "Shown: the whole log.";
+    }
+
+    show(label, on) {
+      if (on) this.hidden.delete(label);
+      else this.hidden.add(label);
+      this.changed();
+    }
+
+    /* The strips' cursor is at a time; None where it left. */
+    follow(time) {
+      if (time === this.cursorAt) return;
+      this.cursorAt = time;
+      this.say();
+      if (this.map) this.map.draw();
+    }
+
+    point(time) {
+      this.asked = Math.min(Math.max(time, this.from), this.to);
+      this.pointed.forEach((act) => act());
+    }
+
+    /* All rows where a reader looks close enough, and the overview elsewhere. */
+    level() {
+      const share = (this.to - this.from) / (this.whole[1] - this.whole[0]);
+      if (this.plain.fine && !this.rows && share < 0.6 && !this.asking) {
+        this.asking = true;
+        document.head.append(el("script", { src: this.plain.fine }));
+      }
+      const near = this.rows && share * this.rows.t.length < most;
+      this.data = near ? this.rows : this.overview;
+    }
+
+    loaded(data) {
+      this.rows = ferryid.decode(this.plain, data);
+      this.level();
+      this.changed();
+    }
+
+    changed() {
+      this.say();
+      this.redraw.forEach((act) => act());
+    }
+
+    say() {
+      const at = this.cursor === null ? "" : " · cursor " + ferryid.text(this.cursor) + " s";
+      this.range.textContent = ferryid.text(this.from) + " to " + ferryid.text(this.to) + " s" + at;
+    }
+
+    pressed(event) {
+      if (event.ctrlKey || event.metaKey || event.altKey || /INPUT|SELECT|SUMMARY/.test(event.target.tagName)) return;
+      const step = (this.to - this.from) / 200;
+      const now = this.cursor === null ? 0.5 * (this.from + this.to) : this.cursor;
+      const side = event.key === "ArrowLeft" ? -1 : 1;
+      if (event.key === "ArrowLeft" || event.key === "ArrowRight") {
+        if (event.shiftKey) this.shift(0.25 * side);
+        else this.point(now + side * step);
+      } else if (event.key === "+" || event.key === "=") this.zoom(2);
+      else if (event.key === "-") this.zoom(0.5);
+      else if (event.key === "0" || event.key === "Home") this.jump(-1);
+      else if (/^[1-9]$/.test(event.key) && Number(event.key) <= this.marks.length) this.jump(Number(event.key) - 1);
+      else return;
+      event.preventDefault();
+    }
+  }
+
+  ferryid.show = function (plains) {
+    plains.forEach((plain, number) => {
+      const section = document.querySelector('[data-timeline="' + (number + 1) + '"]');
+      if (section) all[number] = new Timeline(plain, number, section);
+    });
+    document.documentElement.classList.add("interactive");
+    ferryid.all = all;
+  };
+
+  ferryid.rows = (number, data) => all[number].loaded(data);
+})();
