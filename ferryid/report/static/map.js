@@ -82,8 +82,8 @@
       return { north: 0.5 * (south + top), east: 0.5 * (west + right), scale: 1 / size };
     }
 
-    at(k) {
-      const [north, east] = this.state.data.place;
+    at(k, places) {
+      const [north, east] = places || this.state.data.place;
       if (k < 0 || north[k] === null || east[k] === null || north[k] === undefined) return null;
       return [
         0.5 * this.width + (east[k] - this.view.east) * this.view.scale,
@@ -106,19 +106,25 @@
       const last = ferryid.before(t, this.state.to);
       this.path(ink, 0, t.length - 1, "faint", 1.2);
       this.path(ink, first, last, "measured", 2.2);
+      const other = this.state.other;
+      if (other && other.data.place) {
+        ink.setLineDash([4, 4]);
+        this.path(ink, 0, other.data.t.length - 1, "c3", 1.6, other.data.place);
+        ink.setLineDash([]);
+      }
       this.frame(ink);
       this.plain.arrows.forEach((one, k) => this.on[k] && this.arrows(ink, one, this.state.data.arrows[k], first, last));
       this.vessel(ink);
     }
 
-    path(ink, first, last, role, width) {
+    path(ink, first, last, role, width, places) {
       ink.strokeStyle = ferryid.colour(role);
       ink.lineWidth = width;
       ink.beginPath();
       let down = false;
       const step = Math.max(1, Math.floor((last - first) / 6000));
       for (let k = first; k <= last; k += step) {
-        const place = this.at(k);
+        const place = this.at(k, places);
         if (place && down) ink.lineTo(...place);
         else if (place) ink.moveTo(...place);
         down = place !== null;

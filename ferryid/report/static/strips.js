@@ -48,9 +48,10 @@
         values.append(el("label", {}, box, swatch, trace.label + " ", output));
         return output;
       });
+      const extra = el("div", { class: "switches extra" });
       const drawing = el("div", { class: "drawing", role: "img", "aria-label": strip.label + " over time" });
-      this.root.append(el("div", { class: "strip" }, el("div", { class: "head" }, el("strong", {}, strip.label), values), drawing));
-      return { strip, k, outputs, drawing, values, plot: null };
+      this.root.append(el("div", { class: "strip" }, el("div", { class: "head" }, el("strong", {}, strip.label), values, extra), drawing));
+      return { strip, k, outputs, drawing, values, extra, plot: null };
     }
 
     /* Draw for the first time: only now are the widths known. */
@@ -62,6 +63,7 @@
           height: this.height(last),
           legend: { show: false },
           cursor: {
+            y: false,
             sync: { key: this.state.key, setSeries: false },
             drag: { x: true, y: false, setScale: false },
             bind: { dblclick: () => () => this.state.see(...this.state.whole) },
@@ -75,10 +77,40 @@
             setCursor: [(plot) => this.moved(row, plot)],
           },
         };
-        row.plot = new uPlot(options, [this.state.data.t, ...this.state.data.strips[row.k]], row.drawing);
+        row.plot = new uPlot(options, this.columns(row), row.drawing);
+        row.drawn = this.state.data;
         this.listen(row.plot);
       });
       new ResizeObserver(() => this.rows.forEach((row) => this.resize(row))).observe(this.root);
+    }
+
+    columns(row) {
+      return [this.state.data.t, ...this.state.data.strips[row.k], ...(row.beside || [])];
+    }
+
+    /* Lay the same signals of another log over these, dashed, from its own start on. */
+    overlay() {
+      const other = this.state.other;
+      this.rows.forEach((row) => {
+        const own = row.strip.traces.length;
+        const its = other ? other.plain.strips.findIndex((strip) => strip.label === row.strip.label) : -1;
+        const traces = its < 0 ? [] : other.plain.strips[its].traces.map((trace, i) => ({ trace, i })).filter(({ trace }) => !other.hidden.has(trace.label));
+        row.beside = traces.map(({ i }) => this.state.laid(other.data.strips[its][i]));
+        row.extra.replaceChildren();
+        row.outputs.length = own;
+        row.plot.batch(() => {
+          while (row.plot.series.length > own + 1) row.plot.delSeries(own + 1);
+          traces.forEach(({ trace }, i) => {
+            row.plot.addSeries({ ...series({ ...trace, dash: [2, 3] }), label: other.plain.title + ": " + trace.label, show: true }, own + 1 + i);
+            const output = el("output", {}, "");
+            const swatch = el("span", { class: "swatch dashed", style: "--of: var(--" + trace.colour + ")" });
+            row.extra.append(el("span", {}, swatch, other.plain.title + ", " + trace.label + " ", output));
+            row.outputs.push(output);
+          });
+          row.plot.setData(this.columns(row), false);
+          row.plot.setScale("x", { min: this.state.from, max: this.state.to });
+        });
+      });
     }
 
     height(last) {
@@ -95,7 +127,7 @@
       this.rows.forEach((row) => {
         if (!row.plot) return;
         row.plot.batch(() => {
-          if (row.drawn !== this.state.data) row.plot.setData([this.state.data.t, ...this.state.data.strips[row.k]], false);
+          if (row.drawn !== this.state.data) row.plot.setData(this.columns(row), false);
           row.drawn = this.state.data;
           row.strip.traces.forEach((trace, i) => {
             const shown = !this.state.hidden.has(trace.label);

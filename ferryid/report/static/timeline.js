@@ -22,6 +22,8 @@
       plain.strips.forEach((strip) => strip.traces.forEach((trace) => trace.shown || this.hidden.add(trace.label)));
       this.redraw = [];
       this.pointed = [];
+      this.other = null;
+      this.later = 0;
       this.section = section;
       this.build();
     }
@@ -42,7 +44,7 @@
         pan.setAttribute("aria-pressed", this.strips.pan);
         this.section.classList.toggle("pan", this.strips.pan);
       });
-      const tools = el(
+      const tools = (this.tools = el(
         "div",
         { class: "tools", role: "toolbar", "aria-label": "time axis" },
         button("+", "zoom in", () => this.zoom(2)),
@@ -53,7 +55,7 @@
         pan,
         this.range,
         ferryid.themeButton(),
-      );
+      ));
       this.marks = this.plain.marks.map((mark, k) => {
         const where = mark.spans.length ? mark.spans[0].map((one) => one.toFixed(0)).join(" to ") + " s" : "whole log";
         const more = mark.spans.length > 1 ? ", " + mark.spans.length + " times" : "";
@@ -89,7 +91,7 @@
       const middle = 0.5 * (from + to);
       from = Math.min(Math.max(middle - 0.5 * width, first), last - width);
       [this.from, this.to] = [from, from + width];
-      this.level();
+      if (this.level()) this.lay();
       this.changed();
     }
 
@@ -145,13 +147,55 @@
         document.head.append(el("script", { src: this.plain.fine }));
       }
       const near = this.rows && share * this.rows.t.length < most;
+      const before = this.data;
       this.data = near ? this.rows : this.overview;
+      return this.data !== before;
     }
 
     loaded(data) {
       this.rows = ferryid.decode(this.plain, data);
-      this.level();
+      if (this.level()) this.lay();
       this.changed();
+      all.forEach((one) => one.other === this && one.lay());
+    }
+
+    /* Choose another log of the page to lay over this one; its time may be shifted. */
+    beside(number, later) {
+      this.other = number < 0 ? null : all[number];
+      this.later = isFinite(later) ? later : 0;
+      this.lay();
+      if (this.map) this.map.draw();
+    }
+
+    lay() {
+      if (this.other || this.strips.rows.some((row) => row.beside)) this.strips.overlay();
+    }
+
+    /* A column of the other log at the times of this one. */
+    laid(values) {
+      const from = this.other.data.t;
+      let k = 0;
+      return this.data.t.map((time) => {
+        const at = time - this.later;
+        if (at < from[0] || at > from[from.length - 1]) return null;
+        while (k + 1 < from.length - 1 && from[k + 1] <= at) k++;
+        const [a, b] = [values[k], values[k + 1]];
+        if (a === null || b === null || b === undefined) return null;
+        const step = from[k + 1] - from[k];
+        return step > 0 ? a + ((b - a) * (at - from[k])) / step : a;
+      });
+    }
+
+    /* Once all logs of the page are there. */
+    offer() {
+      if (all.length < 2) return;
+      const choice = el("select", { "aria-label": "log to lay over this one" }, el("option", { value: -1 }, "no other log"));
+      all.forEach((one, k) => one !== this && choice.append(el("option", { value: k }, one.plain.title)));
+      const later = el("input", { type: "number", value: 0, step: 1, "aria-label": "shift of the other log in seconds" });
+      const act = () => this.beside(Number(choice.value), Number(later.value));
+      choice.addEventListener("change", act);
+      later.addEventListener("change", act);
+      this.tools.insertBefore(el("span", { class: "beside" }, el("label", {}, "beside: ", choice), el("label", {}, " shift ", later, " s")), this.range);
     }
 
     changed() {
@@ -186,6 +230,7 @@
       const section = document.querySelector('[data-timeline="' + (number + 1) + '"]');
       if (section) all[number] = new Timeline(plain, number, section);
     });
+    all.forEach((one) => one.offer());
     document.documentElement.classList.add("interactive");
     ferryid.all = all;
   };
