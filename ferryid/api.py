@@ -266,12 +266,16 @@ def fit(
     """
     from ferryid.identify import FitSettings
     from ferryid.report.fit_report import fit_and_report, fit_archive_and_report
+    from ferryid.report.refusal import shown_where_refused
 
     settings, run, paths = settings or FitSettings(), _context(out, progress, verify, ranges), _paths(logs)
     if archive:
         _refuse_ranges_of_archive(ranges)
         return fit_archive_and_report(_of_archive(run.out, vessel, announce), settings, run, paths, name=name)
-    return fit_and_report(paths, _chosen(paths, vessel, announce), settings, run, name=name)
+    profile = _chosen(paths, vessel, announce)
+    return shown_where_refused(
+        lambda: fit_and_report(paths, profile, settings, run, name=name), "fitted", paths, profile, run
+    )
 
 
 def evaluate(
@@ -413,11 +417,19 @@ def diagnose(
         Check every checksum of the logs.
     """
     from ferryid.report.diagnosis_report import diagnose_and_report
+    from ferryid.report.refusal import shown_where_refused
 
     paths = _paths(logs)
     profile, examined = _examined(paths, vessel, model, out, settings, announce)
     run = _context(out, progress, verify, ranges)
-    outcome = diagnose_and_report(paths, profile, examined, run, name=name, command=command)
+    outcome = shown_where_refused(
+        lambda: diagnose_and_report(paths, profile, examined, run, name=name, command=command),
+        "diagnosed",
+        paths,
+        profile,
+        run,
+        command,
+    )
     progress("")
     return outcome
 
