@@ -85,7 +85,9 @@ def _motion(diagnosis: Diagnosis) -> list[Strip]:
         return []
     surge, sway, yaw = evidence["nu"].T
     strips = [
-        Strip("velocity over ground [m/s]", (Trace("surge u", surge, "c0"), Trace("sway v", sway, "c1", dash=(6.0, 3.0)))),
+        Strip(
+            "velocity over ground [m/s]", (Trace("surge u", surge, "c0"), Trace("sway v", sway, "c1", dash=(6.0, 3.0)))
+        ),
         Strip("yaw rate [deg/s]", (Trace("yaw rate r", np.degrees(yaw), "c0"),)),
     ]
     if "before" not in evidence and "thrust" in evidence:

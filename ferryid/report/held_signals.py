@@ -22,6 +22,8 @@ ROWS = 20_000
 """Most rows of the drawing's grid."""
 HELD = 5.0
 """A line breaks where values are this many times the usual step apart."""
+HALF_TURN = 180.0
+"""A jump of an angle beyond it is one from end to end of a turn [deg]."""
 LARGEST = 1e100
 """Values beyond are drawn at it: no vessel has them, and axes cannot."""
 _DEGREES = ("psi", "phi", "theta", "alpha_", "delta_", "wind_from", "r")
@@ -121,7 +123,9 @@ def held_log(path: str, profile: Profile, run: RunContext) -> HeldLog:
 def _streams(path: str, reader: Reader, profile: Profile, run: RunContext) -> list[Stream]:
     """Return the streams of a recording, or where that is refused, of each topic that can be read."""
     try:
-        return [one for one in record(path, profile, run.tables, ranges=run.ranges).streams.values() if len(one.time_ns)]
+        return [
+            one for one in record(path, profile, run.tables, ranges=run.ranges).streams.values() if len(one.time_ns)
+        ]
     except FerryIdError:
         selection = survey(profile, reader.topics, reader.losses)
     found = []
@@ -151,7 +155,8 @@ def _is(column: str, names: Sequence[str]) -> bool:
 
 def _shown(column: str, values: Floats) -> Floats:
     """Return values as they are drawn: angles in degrees, none beyond what can be drawn."""
-    return np.clip(np.degrees(values) if _is(column, _DEGREES) else values, -LARGEST, LARGEST)
+    shown = np.degrees(values) if _is(column, _DEGREES) else values
+    return np.asarray(np.clip(shown, -LARGEST, LARGEST), dtype=np.float64)
 
 
 def _timeline(name: str, streams: Sequence[Stream]) -> Timeline | None:
@@ -165,7 +170,7 @@ def _timeline(name: str, streams: Sequence[Stream]) -> Timeline | None:
         return None
     t = np.linspace(0.0, length, min(ROWS, max(int(length / max(min(steps), 1e-3)), 1) + 1))
     columns = {
-        column: _on(t, times[id(one)], _shown(column, values))
+        column: _unjoined(column, _on(t, times[id(one)], _shown(column, values)))
         for one in streams
         for column, values in one.columns.items()
     }
@@ -174,16 +179,30 @@ def _timeline(name: str, streams: Sequence[Stream]) -> Timeline | None:
         there = [column for column in columns if _is(column, names) and column not in drawn]
         drawn |= set(there)
         traces = tuple(
-            Trace(column, columns[column], f"c{k % _COLOURS}", dash=(6.0, 3.0) if "_cmd" in column or column.endswith("_d") else ())
+            Trace(
+                column,
+                columns[column],
+                f"c{k % _COLOURS}",
+                dash=(6.0, 3.0) if "_cmd" in column or column.endswith("_d") else (),
+            )
             for k, column in enumerate(there)
         )
         strips += [Strip(label, traces)] if traces else []
-    strips += [Strip(column, (Trace(column, values, "c0"),)) for column, values in columns.items() if column not in drawn]
+    strips += [
+        Strip(column, (Trace(column, values, "c0"),)) for column, values in columns.items() if column not in drawn
+    ]
     place = None
     if {"x", "y"} <= set(columns):
         heading = np.radians(columns.get("psi", np.full(len(t), np.nan)))
         place = np.column_stack([columns["x"], columns["y"], heading])
     return Timeline(name, t, tuple(strips), place=place)
+
+
+def _unjoined(column: str, values: Floats) -> Floats:
+    """Return values with no line from one end of a turn to the other."""
+    if column != "r" and _is(column, _DEGREES):
+        values[1:][np.abs(np.diff(values)) > HALF_TURN] = np.nan
+    return values
 
 
 def _on(t: Floats, own: Floats, values: Floats) -> Floats:

@@ -163,7 +163,7 @@ def _render(
                 {
                     "file": f"signals-{k + 1}",
                     "svg": drawings[f"signals-{k + 1}"],
-                    "caption": "The signals of the profile as the log has them, in SI units and the profile's frames, angles in degrees.",
+                    "caption": "The signals of the profile as the log has them, in SI units, angles in degrees.",
                     "over_time": True,
                 }
             ]

@@ -24,6 +24,8 @@ MISSING = -32768
 """Step that stands for a missing value."""
 STEPS = 65534
 """Steps between the least and the greatest value of a column."""
+LARGEST = 1e150
+"""What is beyond is drawn at it: the span of the values must be a number."""
 BREAK = 2.5
 """A line breaks where two rows are this many times the usual step apart."""
 
@@ -247,6 +249,7 @@ def _encoded(t: Floats, columns: Iterable[Floats]) -> dict[str, Any]:
 def _steps(values: Floats, kind: np.dtype[Any]) -> list[Any]:
     """Return offset, size of a step, and the steps as base64."""
     good = np.isfinite(values)
+    values = np.clip(values, -LARGEST, LARGEST)
     low, high = (float(values[good].min()), float(values[good].max())) if good.any() else (0.0, 0.0)
     middle = low if kind.kind == "u" else 0.5 * (low + high)
     count = float(np.iinfo(kind).max) if kind.kind == "u" else float(STEPS)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.cli.test_every_command import conforms
 from tests.ingest.mcap_records import DATA_END, MAGIC, footer, record, text
 
 
@@ -24,6 +25,18 @@ def refused(run, *parts: str) -> None:
     assert "Traceback" not in run.err
     for part in parts:
         assert part in lines[0], lines[0]
+
+
+def drawn(run, out: Path) -> dict:
+    """Check that a refusal names a page on its log, which is whole, and that it left nothing else; return its JSON."""
+    page = Path(run.err.strip().rpartition("What the log holds is drawn in ")[2])
+    assert page.name == "report.html"
+    assert sorted(path.name for path in (out / "reports").iterdir()) == ["assets", page.parent.name]
+    assert page.read_text(encoding="utf-8").rstrip().endswith("</html>")
+    assert not (out / "models").exists()
+    result = conforms((page.parent / "refusal.json").read_text(encoding="utf-8"))
+    assert run.err.strip().startswith(f"ferryid: {result['error']}")
+    return result
 
 
 @pytest.mark.parametrize("command", ["inspect", "ingest", "fit"])

@@ -13,7 +13,7 @@ from ferryid.models.forces import motion_force
 from ferryid.models.store import load_file
 from ferryid.vessel import applied_force, load_profile
 from tests.cli.recordings import Table, corners, profile, write
-from tests.cli.test_bad_input import refused
+from tests.cli.test_bad_input import drawn, refused
 from tests.cli.test_every_command import conforms
 from tests.identify.rounds import PROFILE, motion
 
@@ -72,9 +72,9 @@ def test_a_fit_refuses_with_the_cause_and_leaves_no_model(
     table = corners()
     edit(table)
     log, out = write(table, tmp_path / "edited.csv"), tmp_path / "out"
-    refused(ferryid("fit", log, "--vessel", profile(tmp_path), "--out", out), "edited", *parts)
-    assert not (out / "models").exists()
-    assert not (out / "reports").exists()
+    run = ferryid("fit", log, "--vessel", profile(tmp_path), "--out", out)
+    refused(run, "edited", *parts)
+    assert [one["name"] for one in drawn(run, out)["logs"]] == ["edited"]
 
 
 @pytest.mark.slow
@@ -83,8 +83,7 @@ def test_speeds_declared_in_too_large_a_unit_are_refused(ferryid, tmp_path: Path
     vessel = profile(tmp_path, ('unit = "rpm"', 'unit = "rad/s"'))
     run = ferryid("fit", log, "--vessel", vessel, "--out", out)
     refused(run, "several times too large", "1 rad/s is 9.55 rpm")
-    assert not (out / "models").exists()
-    assert not (out / "reports").exists()
+    drawn(run, out)
 
 
 @pytest.mark.slow
@@ -204,5 +203,4 @@ def test_left_and_right_exchanged_on_a_real_catamaran_are_refused(ferryid, share
     vessel.write_text(other.replace('"/other"', '"/right_thruster"'), encoding="utf-8")
     run = ferryid("fit", *logs, "--vessel", vessel, "--components", "6", "--out", tmp_path / "out")
     refused(run, "the yaw moment accelerates the vessel", "actuators are exchanged (port and starboard")
-    assert not (tmp_path / "out" / "models").exists()
-    assert not (tmp_path / "out" / "reports").exists()
+    drawn(run, tmp_path / "out")

@@ -1,4 +1,4 @@
-"""Headless Chromium over its DevTools protocol: opens pages as files, moves the pointer, presses keys, and keeps what goes wrong."""
+"""Headless Chromium over its DevTools protocol: opens files, moves the pointer, presses keys, and keeps what goes wrong."""
 
 from __future__ import annotations
 
@@ -16,7 +16,9 @@ from urllib.request import Request, urlopen
 
 from tornado.websocket import WebSocketClientConnection, websocket_connect
 
-CHROMIUM = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), "")
+CHROMIUM = next(
+    (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), ""
+)
 START_S = 60.0
 ANSWER_S = 60.0
 
@@ -59,7 +61,9 @@ class Page:
 
     def open(self, path: Path, width: int = 1400, height: int = 900, *, dark: bool = False) -> float:
         """Open a file and return the seconds until it is loaded and drawn."""
-        self.send("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 600)
+        self.send(
+            "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 600
+        )
         self.theme("dark" if dark else "light")
         self._events.clear()
         begin = time.perf_counter()
@@ -154,7 +158,9 @@ def browser(profile: Path) -> Iterator[Page]:
     loop = asyncio.new_event_loop()
     try:
         port = _port(profile / "DevToolsActivePort", process)
-        with urlopen(Request(f"http://127.0.0.1:{port}/json/new?about:blank", method="PUT"), timeout=ANSWER_S) as answer:
+        with urlopen(
+            Request(f"http://127.0.0.1:{port}/json/new?about:blank", method="PUT"), timeout=ANSWER_S
+        ) as answer:
             address = json.load(answer)["webSocketDebuggerUrl"]
         connection = loop.run_until_complete(_connected(address))
         page = Page(loop, connection)

@@ -115,7 +115,7 @@
         const first = Math.min(...mark.spans.map((span) => span[0]));
         const last = Math.max(...mark.spans.map((span) => span[1]));
         const room = 0.15 * (last - first) + 5;
-        this.see(first - room, last + room);
+        this.see(Math.max(first - room, this.whole[0]), Math.min(last + room, this.whole[1]));
       }
       this.live.textContent = mark ? "Shown: " + this.marks[k].textContent + "." : "Shown: the whole log.";
     }
