@@ -1,4 +1,4 @@
-"""What a log holds of a profile's signals, read without a condition that it must fulfil: for a page on a log that was refused."""
+"""What a log holds of a profile's signals, whatever it lacks: for a page on a log that was refused."""
 
 from __future__ import annotations
 
@@ -163,7 +163,7 @@ def _timeline(name: str, streams: Sequence[Stream]) -> Timeline | None:
     if not streams:
         return None
     start = min(int(one.time_ns[0]) for one in streams)
-    times = {id(one): (one.time_ns - start) * 1e-9 for one in streams}
+    times: dict[int, Floats] = {id(one): np.asarray((one.time_ns - start) * 1e-9, dtype=np.float64) for one in streams}
     length = max(float(t[-1]) for t in times.values())
     steps = [float(np.median(np.diff(t))) for t in times.values() if len(t) > 1]
     if length <= 0.0 or not steps:
