@@ -92,6 +92,7 @@
     }
 
     draw() {
+      if (!this.state.opened) return;
       const ratio = window.devicePixelRatio || 1;
       this.width = this.canvas.clientWidth;
       this.height = this.canvas.clientHeight;

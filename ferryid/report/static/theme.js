@@ -12,12 +12,15 @@ var ferryid = { themed: [] };
   } catch (error) {
     /* A browser may refuse to keep anything for files. */
   }
+  /* Asked for anew each time, they would cost more than the drawing. */
+  let colours = {};
   function apply() {
+    colours = {};
     if (choice === "auto") delete root.dataset.theme;
     else root.dataset.theme = choice;
     ferryid.themed.forEach((redraw) => redraw());
   }
-  ferryid.colour = (role) => getComputedStyle(root).getPropertyValue("--" + role).trim() || "#888";
+  ferryid.colour = (role) => (colours[role] = colours[role] || getComputedStyle(root).getPropertyValue("--" + role).trim() || "#888");
   ferryid.themeButton = function () {
     const button = document.createElement("button");
     button.type = "button";

@@ -77,9 +77,21 @@
       this.section.hidden = false;
       this.section.tabIndex = 0;
       this.section.addEventListener("keydown", (event) => this.pressed(event));
+      this.say();
+      /* What is far down the page is drawn when a reader comes near. */
+      const near = new IntersectionObserver((seen) => seen.some((one) => one.isIntersecting) && this.open(), { rootMargin: "400px" });
+      near.observe(this.section);
+      this.near = near;
+    }
+
+    open() {
+      if (this.opened) return;
+      this.opened = true;
+      this.near.disconnect();
       this.strips.open();
       this.strips.follow();
-      this.say();
+      if (this.map) this.map.draw();
+      this.lay();
     }
 
     /* Show a stretch of time. */
@@ -161,6 +173,7 @@
 
     /* Choose another log of the page to lay over this one; its time may be shifted. */
     beside(number, later) {
+      this.open();
       this.other = number < 0 ? null : all[number];
       this.later = isFinite(later) ? later : 0;
       this.lay();
@@ -168,7 +181,7 @@
     }
 
     lay() {
-      if (this.other || this.strips.rows.some((row) => row.beside)) this.strips.overlay();
+      if (this.opened && (this.other || this.strips.rows.some((row) => row.beside))) this.strips.overlay();
     }
 
     /* A column of the other log at the times of this one. */
