@@ -171,7 +171,9 @@ def test_the_keyboard_does_the_same(opened: Page) -> None:
     assert opened.do(f"{STATE}.cursor") > first
     opened.key("ArrowLeft")
     assert opened.do(f"{STATE}.cursor") == pytest.approx(first, abs=2.1)
+    width = view(opened)[1] - view(opened)[0]
     opened.key("-")
+    assert view(opened)[1] - view(opened)[0] > 1.5 * width
     opened.key("2")
     assert opened.do(f"{STATE}.mark") == 1
     opened.key("0")
@@ -207,10 +209,12 @@ def test_the_map_zooms_moves_and_gives_the_time_of_a_place(opened: Page) -> None
 def test_colours_follow_the_system_or_the_reader(opened: Page) -> None:
     paper = "getComputedStyle(document.body).backgroundColor"
     light = opened.do(paper)
+    ink = opened.do("ferryid.colour('ink')")
     opened.theme("dark")
     opened.settle()
     dark = opened.do(paper)
     assert dark != light
+    assert opened.do("ferryid.colour('ink')") != ink
     opened.click(".theme")
     assert opened.do(paper) == light
     opened.click(".theme")

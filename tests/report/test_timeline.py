@@ -49,12 +49,15 @@ def test_a_long_log_has_an_overview_that_keeps_every_peak_and_all_rows_in_a_file
     t = np.arange(36_000) * 0.1
     values = np.random.default_rng(0).standard_normal(t.size)
     values[12_345], values[12_346] = 90.0, -80.0
+    values[23_001], values[23_002] = -70.0, 80.0
     made = scripts([line(t, values, place=np.column_stack([t, -t, 0.0 * t]))])
     (first,) = decoded(made["timeline.js"], "show")[0]
     assert len(column(first["data"]["t"], "<u4")) <= 2 * BINS
     thin = column(first["data"]["columns"][0])
     assert (thin.max(), thin.min()) == pytest.approx((90.0, -80.0), abs=0.01)
     assert np.argmax(thin) + 1 == np.argmin(thin)
+    rises = np.flatnonzero(thin < -60.0)[-1]
+    assert thin[rises + 1] == pytest.approx(80.0, abs=0.01)
     number, rows = decoded(made[first["fine"]], "rows")
     assert number == 0
     assert column(rows["columns"][0]) == pytest.approx(values, abs=170.0 / 65534)
