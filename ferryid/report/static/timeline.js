@@ -246,6 +246,15 @@
     all.forEach((one) => one.offer());
     document.documentElement.classList.add("interactive");
     ferryid.all = all;
+    /* The others once the page is there and nothing else is to be done. */
+    const idle = window.requestIdleCallback || ((act) => setTimeout(act, 200));
+    const next = () => {
+      const one = all.find((each) => !each.opened);
+      if (!one) return;
+      one.open();
+      idle(next);
+    };
+    addEventListener("load", () => idle(next));
   };
 
   ferryid.rows = (number, data) => all[number].loaded(data);
