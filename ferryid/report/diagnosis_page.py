@@ -247,7 +247,7 @@ def _finding(
                 "caption": f"What is left over{since}, against {against}. Points: windows of the recording. Marks: their means "
                 "with 95 % intervals (Student's t times the standard error) from separate visits; hollow: from parts of one or "
                 "two visits, which know less; none where there are too few windows for either. Where the finding holds, orange "
-                "follows the black line, and blue is flat at zero.",
+                "follows the line of what it explains, and blue is flat at zero.",
             }
         )
     if drawn and diagnosis_figures.drawable(finding):
@@ -260,7 +260,9 @@ def _finding(
     if drawn and finding.course is not None:
         measured = next((one.course for one in withheld if one.signal == finding.effect), None)
         beside = (
-            "; black: what the withheld sensor measured, averaged over the same times" if measured is not None else ""
+            "; black, or white on dark: what the withheld sensor measured, averaged over the same times"
+            if measured is not None
+            else ""
         )
         shown.append(
             {
@@ -276,8 +278,8 @@ def _finding(
                 "file": f"{file}-spectrum",
                 "svg": diagnosis_figures.in_frequency(finding),
                 "caption": "Power spectrum of what is left over with the other findings, on the axis on which it acts most. "
-                "Black: the spectrum of a disturbance of the strength and duration that were found, averaged over windows like "
-                "the rest. Where the finding holds, orange is nowhere far below black; far above it there is more.",
+                "What it explains: the spectrum of a disturbance of the strength and duration that were found, averaged over "
+                "windows like the rest. Where the finding holds, orange is nowhere far below it; far above it there is more.",
             }
         )
     return {
