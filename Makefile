@@ -127,7 +127,20 @@ wheel-check: $(VENV)/installed
 $(VENV)/installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[test]'
+	-$(MAKE) --no-print-directory $(STATIC)/uplot.js
 	touch $@
+
+# The library that draws interactive figures, by npm; where it cannot be had, pages keep their static figures.
+UPLOT = 1.6.32
+UPLOT_SHA256 = 4b8a8191e425658e3ea8c8c1314b0fc679c861ee3a1af2b20c7b16ba50b5133d
+STATIC = ferryid/report/static
+$(STATIC)/uplot.js:
+	mkdir -p build
+	npm pack --silent uplot@$(UPLOT) --pack-destination build
+	echo "$(UPLOT_SHA256)  build/uplot-$(UPLOT).tgz" | sha256sum --check --quiet
+	tar -xzOf build/uplot-$(UPLOT).tgz package/LICENSE > $(STATIC)/uplot-LICENSE.txt
+	tar -xzOf build/uplot-$(UPLOT).tgz package/dist/uPlot.min.css > $(STATIC)/uplot.css
+	tar -xzOf build/uplot-$(UPLOT).tgz package/dist/uPlot.iife.min.js > build/uplot.js && mv build/uplot.js $@
 
 $(VENV)/bench-installed: $(VENV)/installed
 	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[bench]'

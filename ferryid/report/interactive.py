@@ -3,7 +3,8 @@
 Scripts lie once per output folder in ``reports/assets/KEY``, beside the folders of the pages.
 
 The key is of their content, so that pages of another version of ferryid keep the scripts that they were written with.
-uPlot draws the lines: 50 kB, MIT licence, which lies beside it.
+uPlot draws the lines (50 kB, MIT licence, which lies beside it). It is no part of the sources: the makefile puts it into
+``static``, from where a wheel takes it, and where it is missing pages keep their static figures.
 """
 
 from __future__ import annotations
@@ -24,6 +25,11 @@ SCRIPTS = ("uplot.js", "theme.js", "decode.js", "map.js", "strips.js", "timeline
 """In the order in which a page loads them."""
 STYLES = ("uplot.css", "timeline.css")
 LICENCE = "uplot-LICENSE.txt"
+
+
+def available() -> bool:
+    """Tell whether the library that draws the lines is there."""
+    return (files("ferryid.report") / "static" / SCRIPTS[0]).is_file()
 
 
 @cache
@@ -84,7 +90,7 @@ def make_interactive(timelines: Mapping[int, Timeline | None], folder: Path, out
         For a folder that cannot be written; nothing half-written is left.
     """
     made = {log: one for log, one in timelines.items() if one is not None}
-    if not made:
+    if not made or not available():
         return STATIC
     key, _ = _contents()
     write_assets(out)

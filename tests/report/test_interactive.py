@@ -14,9 +14,14 @@ from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.report.diagnosis_report import report
 from ferryid.types import Floats
 from tests.report.browser import CHROMIUM, Page, browser
+from tests.report.pages import NEEDS_UPLOT
 from tests.report.test_diagnosis import T, diagnosis
 
-pytestmark = [pytest.mark.slow, pytest.mark.skipif(not CHROMIUM, reason="there is no Chromium to open the pages with")]
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not CHROMIUM, reason="there is no Chromium to open the pages with"),
+    NEEDS_UPLOT,
+]
 OPENED_S = 1.0
 SHIFT = 8
 STATE = "ferryid.all[0]"

@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ferryid.report import interactive
 from ferryid.report.interactive import LICENCE, SCRIPTS, STATIC, STYLES, make_interactive
 from ferryid.report.timeline import BINS, MISSING, Mark, Span, Strip, Timeline, Trace, flagged, overview, scripts
 from ferryid.types import Floats
+from tests.report.pages import NEEDS_UPLOT
 
 
 def line(t: Floats, values: Floats, **more: Any) -> Timeline:
@@ -97,6 +99,13 @@ def test_marked_rows_become_stretches() -> None:
     assert [(one.first, one.last) for one in spans] == [(0.0, 1.0), (4.0, 4.0)]
 
 
+def test_without_the_library_pages_keep_their_static_figures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(interactive, "available", lambda: False)
+    assert make_interactive({0: line(np.arange(3.0), np.arange(3.0))}, tmp_path / "a", tmp_path) is STATIC
+    assert not any(tmp_path.iterdir())
+
+
+@NEEDS_UPLOT
 def test_scripts_are_written_once_and_every_page_links_to_them(tmp_path: Path) -> None:
     one = line(np.arange(3.0), np.arange(3.0))
     made = make_interactive({0: None, 2: one}, tmp_path / "reports" / "a", tmp_path)
