@@ -63,6 +63,9 @@ class Measurements:
         Mass [kg] and place [m] aboard, shape (n, 2), or None.
     usable
         Rows on which everything was measured, shape (n,).
+    repeats
+        Where old values were repeated and taken out before: places of the channels among the columns of `eta` and `nu_raw`,
+        and times of the last right sample before and of the first one after [s].
     """
 
     profile: Profile
@@ -76,6 +79,7 @@ class Measurements:
     wind: Floats | None = None
     current: Floats | None = None
     payload: Floats | None = None
+    repeats: tuple[tuple[tuple[int, ...], float, float], ...] = ()
 
     @property
     def step_s(self) -> float:

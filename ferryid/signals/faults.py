@@ -41,6 +41,15 @@ class Faults:
     taken_out: tuple[str, ...]
     remarks: tuple[str, ...]
 
+    @property
+    def repeats(self) -> tuple[Held, ...]:
+        """Return the stretches in which an old value was repeated, those of poses among them, without a margin."""
+        poses = [one for one in self.poses if one.kind == "held"]
+        return (
+            *(one for one in self.held if one.repeats),
+            *(Held(_SIGNALS[one.signal], one.start_ns, one.end_ns, pose_reason(one), True) for one in poses),
+        )
+
     def wrong_poses(self) -> tuple[Held, ...]:
         """Return the stretches around wrong poses, `SIGNALS.pose_margin_s` on either side, with their signals and reasons."""
         margin_ns = round(SIGNALS.pose_margin_s * 1e9)
@@ -59,7 +68,7 @@ def find_faults(recording: Recording) -> Faults:
     velocities = held_velocities(samples, poses)
     held = [one for source in sources for one in source.held]
     for one in velocities:
-        held.append(Held((one.signal,), one.start_ns, one.end_ns, held_reason(one)))
+        held.append(Held((one.signal,), one.start_ns, one.end_ns, held_reason(one), one.value != 0.0))
         k = next(k for k, source in enumerate(sources) if one.signal in source.columns)
         values = sources[k].columns[one.signal].copy()
         values[one.first : one.last + 1] = np.nan

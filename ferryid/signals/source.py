@@ -27,12 +27,15 @@ class Held:
         Times of the last right sample before and of the first one after [ns].
     reason
         What is wrong, to stand after "because".
+    repeats
+        True where an old value was repeated.
     """
 
     signals: tuple[str, ...]
     start_ns: int
     end_ns: int
     reason: str
+    repeats: bool = False
 
 
 @dataclass(frozen=True)
@@ -127,7 +130,7 @@ def source_of(stream: Stream) -> Source:
 def _stretches(signals: tuple[str, ...], time_ns: Nanoseconds, wrong: Flags, reason: str) -> list[Held]:
     last = time_ns.size - 1
     return [
-        Held(signals, int(time_ns[max(one.start - 1, 0)]), int(time_ns[min(one.stop, last)]), reason)
+        Held(signals, int(time_ns[max(one.start - 1, 0)]), int(time_ns[min(one.stop, last)]), reason, True)
         for one in segments(wrong)
     ]
 

@@ -1,4 +1,7 @@
-"""Held samples: a sensor's last value, repeated while nothing new was measured."""
+"""Held samples: a sensor's last value, repeated while nothing new was measured.
+
+Long repeats are taken out while a log is read, so that nothing is made of them; here they are found all the same.
+"""
 
 from __future__ import annotations
 
@@ -24,14 +27,18 @@ def find(measurements: Measurements) -> SensorFinding | None:
     held = np.column_stack([held_rows(column, measurements.usable, measurements.step_s) for column in columns.T])
     # A position is one sample: what repeats in one direction only is motion across it, or a resolution.
     held[:, :2] &= held[:, :2].all(axis=1, keepdims=True)
-    rows = held.any(axis=1)
+    earlier = taken_out(measurements, columns)
+    found = held | earlier
+    rows = found.any(axis=1)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]]).astype(np.int8))).reshape(-1, 2)
-    share = float(rows.sum()) / max(int(measurements.usable.sum()), 1)
+    share = float(rows.sum()) / len(rows)
     longest = float((edges[:, 1] - edges[:, 0]).max(initial=0)) * measurements.step_s
     if share < (CHECKS.long_held_share if longest >= CHECKS.long_held_s else CHECKS.least_held_share):
         return None
-    names = [name for name, column in zip(NAMES, held.T, strict=True) if column.any()]
+    names = [name for name, column in zip(NAMES, found.T, strict=True) if column.any()]
     percent = 100.0 * share
+    # Each hold began and ended within a row.
+    ends = 100.0 * len(edges) / len(rows)
 
     def correct(measured: Measurements) -> Measurements:
         # What was held is bridged: the jump at its end is no motion, and means reach over it.
@@ -41,7 +48,10 @@ def find(measurements: Measurements) -> SensorFinding | None:
 
     return SensorFinding(
         "held_samples",
-        {"share": Estimate(percent, percent, percent, "%"), "longest": Estimate(longest, longest, longest, "s")},
+        {
+            "share": Estimate(percent, max(percent - ends, 0.0), percent + ends, "%"),
+            "longest": Estimate(longest, max(longest - measurements.step_s, 0.0), longest + measurements.step_s, "s"),
+        },
         f"Old samples were repeated {counted(len(edges), 'time')}, for up to {longest:.1f} s, "
         f"{percent:.1f} % of the log ({', '.join(names)}).",
         correct,
@@ -61,8 +71,7 @@ def held_rows(values: Floats, usable: NDArray[np.bool_], step_s: float) -> NDArr
     lengths = edges[:, 1] - edges[:, 0] + 1
     usual = float(np.median(np.concatenate([lengths, np.ones(max(len(changes) - len(lengths), 0))])))
     long = lengths > max(CHECKS.held_runs * usual, CHECKS.held_rows, CHECKS.held_s / step_s)
-    coarse = np.unique(np.round(changes, 9)).size < CHECKS.coarse_share * len(changes)
-    jump = CHECKS.held_jump * float(np.median(changes)) if coarse or _interpolated(values, usable) else 0.0
+    jump = _least_jump(values, usable)
     for first, last in edges[long].tolist():
         missed = abs(float(values[min(last + 1, len(values) - 1)] - values[last]))
         if (
@@ -72,6 +81,38 @@ def held_rows(values: Floats, usable: NDArray[np.bool_], step_s: float) -> NDArr
         ):
             held[first + 1 : last + 1] = True
     return held
+
+
+def taken_out(measurements: Measurements, columns: Floats) -> NDArray[np.bool_]:
+    """Return the rows of repeats that were taken out while the log was read, shape (n, 6).
+
+    As of those that are found here, some channel has to have moved on meanwhile: a vessel at rest repeats itself rightly.
+    """
+    held = np.zeros(columns.shape, dtype=np.bool_)
+    n = len(columns)
+    jumps = [_least_jump(column, measurements.usable) for column in columns.T] if measurements.repeats else []
+    for channels, start_s, end_s in measurements.repeats:
+        first, last = (int(np.searchsorted(measurements.t, at - 0.5 * measurements.step_s)) for at in (start_s, end_s))
+        if not 0 < last - first < n:
+            continue
+        ends = min(last, n - 1)
+        missed = {k: abs(float(columns[ends, k] - columns[first, k])) for k in channels}
+        moved = [
+            one > jumps[k]
+            and one >= CHECKS.held_missed * _usual(columns[:, k], measurements.usable, first, last - 1)
+            for k, one in missed.items()
+        ]
+        if any(moved) and end_s - start_s > CHECKS.held_s:
+            held[first + 1 : last, channels] = True
+    return held
+
+
+def _least_jump(values: Floats, usable: NDArray[np.bool_]) -> float:
+    """Return how far a channel has to jump after a hold: beyond its resolution where it is coarse or was interpolated."""
+    changes = np.abs(np.diff(values))[usable[1:] & usable[:-1]]
+    changes = changes[changes > 0.0]
+    coarse = np.unique(np.round(changes, 9)).size < CHECKS.coarse_share * len(changes)
+    return CHECKS.held_jump * float(np.median(changes)) if coarse or _interpolated(values, usable) else 0.0
 
 
 def _usual(values: Floats, usable: NDArray[np.bool_], first: int, last: int) -> float:

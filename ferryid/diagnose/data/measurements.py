@@ -22,6 +22,7 @@ from ferryid.signals.prepare import doubts_of
 from ferryid.signals.recording import Recording, data_quality, record
 from ferryid.signals.sampling import check_sampling
 from ferryid.signals.smooth import Measured, measure, odd_rows, smooth_measured, steady_mean
+from ferryid.signals.source import Held
 from ferryid.signals.track import LeftOut, Motion, Track
 from ferryid.types import IN_MEMORY, Flags, Floats, RunContext
 from ferryid.vessel.dimensions import window_seconds
@@ -35,6 +36,8 @@ WITHHELD = {
 }
 """What may be kept from the diagnosis, to be compared with what it finds, and the columns of it."""
 STRIDES = 4
+CHANNELS = {"x": (0, 1), "y": (0, 1), "psi": (2,), "u": (3,), "v": (4,), "r": (5,), "vel_N": (3, 4), "vel_E": (3, 4)}
+"""Places of a signal among north, east, heading, surge, sway and yaw rate; a position is one sample."""
 
 
 @dataclass(frozen=True)
@@ -150,7 +153,8 @@ def read_measurements(
             f"{recording.name}: no recording of a vessel, {why}. Fix: use recorded logs, or map measured signals in the profile"
         ) from error
     motion = smooth_measured(measured, window_s)
-    measurements = _measurements(track, measured, profile, window_s)
+    repeats = _repeats(faults.repeats, track.t0_ns)
+    measurements = replace(_measurements(track, measured, profile, window_s), repeats=repeats)
     doubts = doubts_of(recording, track)
     # Windows of a diagnosis end at a gap, so that smoothing loses nothing beside it; but they need the pose.
     placeless = LeftOut.of(
@@ -200,6 +204,15 @@ def _without(track: Track, withhold: Sequence[str]) -> tuple[Track, dict[str, Fl
             )
         hidden[name] = np.column_stack([first, second])
     return replace(track, columns=columns), hidden
+
+
+def _repeats(held: Sequence[Held], t0_ns: int) -> tuple[tuple[tuple[int, ...], float, float], ...]:
+    """Return stretches of repeated values as `Measurements.repeats`; components over ground stand for surge and sway alike."""
+    return tuple(
+        (channels, (one.start_ns - t0_ns) * 1e-9, (one.end_ns - t0_ns) * 1e-9)
+        for one in held
+        if (channels := tuple(sorted({place for name in one.signals for place in CHANNELS.get(name, ())})))
+    )
 
 
 def _measurements(track: Track, measured: Measured, profile: Profile, window_s: float) -> Measurements:
