@@ -20,7 +20,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.diagnose.checks.regression import Solution, step
+from ferryid.diagnose.checks.regression import Solution, independence, step
 from ferryid.diagnose.checks.spans import Spans, spans
 from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.effects.force_model import Measurements
@@ -32,6 +32,8 @@ SCALE, ANGLE, X, Y, LATE, NORTH, EAST = range(7)
 NEUTRAL = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 SIZE = np.array([0.5, 0.5, 10.0, 10.0, 2.0, 1.0, 1.0])
 TINY = np.array([1e-4, 1e-4, 1e-2, 1e-2, 1e-2, 1e-3, 1e-3])
+GROSS = (SCALE, ANGLE)
+"""Those that are let in from the start where they seem gross."""
 STEPS = 12
 DERIVATIVE_S = 2.0
 
@@ -69,7 +71,7 @@ class Kinematics:
             return False
         one, other = self.solution.values[index] - NEUTRAL[index], self.rival[index] - NEUTRAL[index]
         both = min(abs(one), abs(other)) >= least and one * other > 0.0
-        return bool(both and self.solution.certain(index, float(NEUTRAL[index])))
+        return bool(both and _certain(self.solution, index))
 
     def evidence(self, index: int) -> dict[str, Floats]:
         """Return what one parameter explains: its regressor against what is left without it."""
@@ -151,6 +153,13 @@ def kinematics(measurements: Measurements, forced: tuple[int, ...] = ()) -> Kine
     searched = _search(data, p, active)
     if searched is None:
         return None
+    if idle := [k for k in GROSS if searched[2][k] and k not in forced and not _certain(searched[1], k)]:
+        # What looked gross at the start was another error, such as a long arm.
+        p, active = searched[0].copy(), searched[2].copy()
+        p[idle], active[idle] = NEUTRAL[idle], False
+        searched = _search(data, p, active)
+        if searched is None:
+            return None
     p, solution, active = searched
     rival = _solve(data, p, active, own=True)
     if rival is None:
@@ -187,8 +196,12 @@ def _start(data: _Data) -> tuple[Floats, NDArray[np.bool_]]:
     scale, angle = abs(product) / power, float(np.angle(product))
     if scale > 0.1 and max(abs(scale - 1.0), abs(angle)) > CHECKS.gross:
         start[SCALE], start[ANGLE] = scale, angle
-        active[[SCALE, ANGLE]] = True
+        active[[*GROSS]] = True
     return start, active
+
+
+def _certain(solution: Solution, index: int) -> bool:
+    return solution.certain(index, float(NEUTRAL[index]))
 
 
 def _search(data: _Data, start: Floats, active: NDArray[np.bool_]) -> tuple[Floats, Solution, NDArray[np.bool_]] | None:
@@ -203,7 +216,8 @@ def _search(data: _Data, start: Floats, active: NDArray[np.bool_]) -> tuple[Floa
         scores = []
         for k in np.flatnonzero(~active).tolist():
             more = active.copy()
-            more[k] = True
+            # Of an arm with one component the other would be in the scatter.
+            more[[X, Y] if k in (X, Y) else k] = True
             change = _step(data, p, more, e, J, Z)
             if change is not None and change.certain(k):
                 scores.append((change.score(k), k))
@@ -216,7 +230,8 @@ def _search(data: _Data, start: Floats, active: NDArray[np.bool_]) -> tuple[Floa
 def _step(data: _Data, p: Floats, active: NDArray[np.bool_], e: Floats, J: Floats, Z: Floats) -> Solution | None:
     """Return the change of the parameters that were let in, zero for the others."""
     Z, J = Z[:, :, active], J[:, :, active]
-    change = step(Z, J, e, data.problem.place, SIZE[active], (p - NEUTRAL)[active])
+    place = data.problem.place
+    change = step(Z, J, e, place, SIZE[active], (p - NEUTRAL)[active], *independence(place))
     if change is None:
         return None
     values, errors = np.zeros(7), np.zeros(7)

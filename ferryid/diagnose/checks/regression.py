@@ -47,6 +47,22 @@ class Solution:
         return self.score(index, neutral) > float(stdtrit(self.freedom, 1.0 - 0.5 * CHECKS.false_alarm))
 
 
+def independence(place: NDArray[np.int64]) -> tuple[int, float]:
+    """Return how far apart residuals of a log are taken as independent, and by what errors are too small for it.
+
+    Residuals of a long log are, `CHECKS.independent_strides` apart. A short log would have too few such blocks to know an
+    error by; its blocks are shorter, and its errors larger by what longer blocks usually add.
+
+    Parameters
+    ----------
+    place
+        Number of each window, in strides from the start, ascending, shape (m,).
+    """
+    fits = int(place[-1] - place[0] + 1) // CHECKS.fewest_blocks
+    strides = min(max(fits, CHECKS.overlapping_strides), CHECKS.independent_strides)
+    return strides, float((CHECKS.independent_strides / strides) ** CHECKS.error_growth)
+
+
 def step(
     Z: Floats,
     J: Floats,
@@ -55,6 +71,7 @@ def step(
     size: Floats,
     away: Floats,
     independent: int = CHECKS.independent_strides,
+    growth: float = 1.0,
 ) -> Solution | None:
     """Return the change p for which ``e + J p`` has nothing of the instruments in it; None where there is too little data.
 
@@ -75,10 +92,13 @@ def step(
         How far the parameters are from their neutral values already, shape (q,).
     independent
         Residuals so many strides apart are taken as independent.
+    growth
+        Factor on the errors.
     """
     block = np.unique(place // independent, return_inverse=True)[1]
     count, (m, c, q) = int(block.max(initial=-1)) + 1, J.shape
-    freedom = count - q
+    # Of c values in a block, all parameters together take q / c blocks.
+    freedom = count + -q // c
     if freedom < 3:
         return None
     Z, J = Z * size, J * size
@@ -104,4 +124,4 @@ def step(
         even += covariance * (product if lag == 0 else product + product.T)
     prior = variance**2 * np.eye(q)
     spreads = [np.diag(inverse @ (middle * (count / freedom) + prior) @ inverse.T) for middle in (sums.T @ sums, even)]
-    return Solution(size * p, size * np.sqrt(np.maximum(*spreads)), freedom)
+    return Solution(size * p, growth * size * np.sqrt(np.maximum(*spreads)), freedom)

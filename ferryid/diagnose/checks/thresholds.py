@@ -23,6 +23,21 @@ class CheckThresholds:
         "residuals this far apart are taken as independent",
         "convention: 30 s, longer than errors of a navigation filter last",
     )
+    fewest_blocks: int = threshold(
+        12,
+        "blocks",
+        "of independent residuals; in logs too short for so many, blocks are shorter",
+        "convention: the scatter of fewer does not give an error",
+    )
+    overlapping_strides: int = threshold(
+        4, "strides", "shortest such block", "derived: windows of 8 s, 2 s apart, overlap within it"
+    )
+    error_growth: float = threshold(
+        0.35,
+        "-",
+        "power of a block's length by which errors grow with it",
+        "tuned on Esso Osaka, milliAmpère and Gunnerus: blocks of 30 s give 1.0 to 1.6 times the errors of blocks of 8 s",
+    )
     outlier: float = threshold(
         6.0,
         "usual residuals",

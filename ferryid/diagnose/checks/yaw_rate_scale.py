@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ferryid.diagnose.checks.check import Check, SensorFinding
-from ferryid.diagnose.checks.regression import Solution, step
+from ferryid.diagnose.checks.regression import Solution, independence, step
 from ferryid.diagnose.checks.spans import LENGTH_S, STRIDE_S, Spans, spans
 from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.effects.force_model import Measurements
@@ -104,7 +104,8 @@ def find(measurements: Measurements) -> SensorFinding | None:
 
 def _step(Z: Floats, J: Floats, measured: Floats, problem: Spans) -> Solution | None:
     """Return factor, bias and delay by regression with instruments, with errors for noise that grows with the rate."""
-    solved = step(Z[:, None, :], J[:, None, :], measured[:, None], problem.place, SIZE, -NEUTRAL)
+    independent, growth = independence(problem.place)
+    solved = step(Z[:, None, :], J[:, None, :], measured[:, None], problem.place, SIZE, -NEUTRAL, independent)
     if solved is None:
         return None
     left = measured + J @ solved.values
@@ -113,18 +114,16 @@ def _step(Z: Floats, J: Floats, measured: Floats, problem: Spans) -> Solution | 
     known, even, weighed = (np.zeros((int(row[-1]) + 1, k)) for k in (1, 1, 3))
     known[row], even[row, 0], weighed[row] = 1.0, left / size, Z * size[:, None]
     middle = np.zeros((3, 3))
-    for lag in range(min(CHECKS.independent_strides, len(known) - 1)):
+    for lag in range(min(independent, len(known) - 1)):
         pairs = float(np.sum(known[lag:] * known[: len(known) - lag]))
         if pairs == 0.0:
             continue
-        covariance = (
-            float(np.sum(even[lag:] * even[: len(even) - lag])) / pairs * (1.0 - lag / CHECKS.independent_strides)
-        )
+        covariance = float(np.sum(even[lag:] * even[: len(even) - lag])) / pairs * (1.0 - lag / independent)
         product = weighed[lag:].T @ weighed[: len(weighed) - lag]
         middle += covariance * (product if lag == 0 else product + product.T)
     scaled = (Z * SIZE).T @ (J * SIZE) + float(np.mean(left**2)) * np.eye(3)
     inverse = SIZE[:, None] * np.linalg.inv(scaled) * SIZE
-    errors = np.sqrt(np.maximum(np.diag(inverse @ middle @ inverse.T), 0.0))
+    errors = growth * np.sqrt(np.maximum(np.diag(inverse @ middle @ inverse.T), 0.0))
     freedom = max(solved.freedom, int(len(left) / OVERLAP) - len(NEUTRAL))
     errors[0] = np.hypot(errors[0], CHECKS.filtered_scale)
     return Solution(solved.values, errors, freedom)
