@@ -7,7 +7,7 @@ that is `b` too large, a velocity that is multiplied by `k`, positions that are 
     d/dt (p - R(psi - b) l) = R(psi(t - T) - b) nu(t - T) / k + d
 
 Both sides are averaged over windows whose weight takes the derivative. Parameters are let in one after the other, the most
-certain first. Velocities are noisy, and noise in a regressor makes its factor too small; so the regressors' instruments are
+certain first, and two at once where no single one is certain. Velocities are noisy, and noise in a regressor makes its factor too small; so the regressors' instruments are
 made of positions, and made of velocities in a second solution. The truth lies between the two where positions are noisy as
 well, which is why a finding has to be one in both.
 """
@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,8 @@ SCALE, ANGLE, X, Y, LATE, NORTH, EAST = range(7)
 NEUTRAL = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 SIZE = np.array([0.5, 0.5, 10.0, 10.0, 2.0, 1.0, 1.0])
 TINY = np.array([1e-4, 1e-4, 1e-2, 1e-2, 1e-2, 1e-3, 1e-3])
+TOGETHER = ((SCALE,), (ANGLE,), (X, Y), (LATE,))
+"""Those that are let in together: of an arm with one component the other would be in the scatter."""
 GROSS = (SCALE, ANGLE)
 """Those that are let in from the start where they seem gross."""
 STEPS = 12
@@ -213,18 +216,21 @@ def _search(data: _Data, start: Floats, active: NDArray[np.bool_]) -> tuple[Floa
             return None
         p, solution = solved
         e, J, Z = data.residual(p), data.derivatives(p), data.instruments(p)
-        scores = []
-        for k in np.flatnonzero(~active).tolist():
-            more = active.copy()
-            # Of an arm with one component the other would be in the scatter.
-            more[[X, Y] if k in (X, Y) else k] = True
-            change = _step(data, p, more, e, J, Z)
-            if change is not None and change.certain(k):
-                scores.append((change.score(k), k))
+        open_ = [one for one in TOGETHER if not active[list(one)].all()]
+        # Beside one error another may hide; each of two has to be certain then.
+        for several in (combinations(open_, 1), combinations(open_, 2)):
+            scores = []
+            for some in several:
+                more = active.copy()
+                more[[k for one in some for k in one]] = True
+                change = _step(data, p, more, e, J, Z)
+                if change is not None and all(any(map(change.certain, one)) for one in some):
+                    scores.append((min(max(map(change.score, one)) for one in some), some))
+            if scores:
+                break
         if not scores:
             return p, solution, active
-        chosen = max(scores)[1]
-        active[[X, Y] if chosen in (X, Y) else chosen] = True
+        active[[k for one in max(scores)[1] for k in one]] = True
 
 
 def _step(data: _Data, p: Floats, active: NDArray[np.bool_], e: Floats, J: Floats, Z: Floats) -> Solution | None:
