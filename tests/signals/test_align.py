@@ -16,6 +16,7 @@ import ferryid
 from ferryid.errors import FerryIdError
 from ferryid.ingest.clocks import ClockReport
 from ferryid.signals.align import align
+from ferryid.signals.faults import find_faults
 from ferryid.signals.recording import record
 from ferryid.signals.stream import Recording, Stream
 from ferryid.signals.track import Track, segments
@@ -216,6 +217,8 @@ def test_a_navigation_that_repeats_itself_while_moving_is_no_measurement() -> No
     assert not track.valid[205:228].any()
     assert track.valid[:200].all()
     assert any("29 of 600 messages repeat an old measurement" in said for said in track.repairs)
+    (held,) = find_faults(recording(stream("/navigation", t, columns), thrusters(t))).repeats
+    assert (held.end_ns - held.start_ns) * 1e-9 == pytest.approx(3.0)
 
 
 def test_one_velocity_that_is_stuck_is_no_measurement() -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ferryid.diagnose.checks import held_samples
 from ferryid.effects import effects
 from ferryid.effects.force_model import Measurements, hull_of, required_force
 from ferryid.effects.measurements import hull_force_model
@@ -168,6 +169,16 @@ def test_held_samples_are_a_share_of_the_log() -> None:
     assert np.count_nonzero(np.diff(repeated.astype(int)) == 1) == 3
     assert np.array_equal(repeated, np.diff(after["psi"]) == 0.0)
     assert np.array_equal(after["thrust"], before["thrust"])
+
+
+def test_held_samples_are_found_though_the_reader_takes_them_out(tmp_path: Path) -> None:
+    log = altered(tanker(), "held_samples", {"share": 10.0})
+    finding = held_samples.find(written(log, tmp_path).measurements)
+    assert finding is not None
+    share = finding.parameters["share"]
+    assert share.low <= 10.0 <= share.high
+    assert finding.parameters["longest"].value == pytest.approx(2.0, abs=0.2)
+    assert held_samples.find(tanker().measurements) is None
 
 
 def test_rounded_angles() -> None:

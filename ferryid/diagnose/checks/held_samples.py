@@ -98,8 +98,7 @@ def taken_out(measurements: Measurements, columns: Floats) -> NDArray[np.bool_]:
         ends = min(last, n - 1)
         missed = {k: abs(float(columns[ends, k] - columns[first, k])) for k in channels}
         moved = [
-            one > jumps[k]
-            and one >= CHECKS.held_missed * _usual(columns[:, k], measurements.usable, first, last - 1)
+            one > jumps[k] and one >= CHECKS.held_missed * _usual(columns[:, k], measurements.usable, first, last - 1)
             for k, one in missed.items()
         ]
         if any(moved) and end_s - start_s > CHECKS.held_s:

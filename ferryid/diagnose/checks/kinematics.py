@@ -7,9 +7,9 @@ that is `b` too large, a velocity that is multiplied by `k`, positions that are 
     d/dt (p - R(psi - b) l) = R(psi(t - T) - b) nu(t - T) / k + d
 
 Both sides are averaged over windows whose weight takes the derivative. Parameters are let in one after the other, the most
-certain first, and two at once where no single one is certain. Velocities are noisy, and noise in a regressor makes its factor too small; so the regressors' instruments are
-made of positions, and made of velocities in a second solution. The truth lies between the two where positions are noisy as
-well, which is why a finding has to be one in both.
+certain first, and two at once where no single one is certain. Velocities are noisy, and noise in a regressor makes its factor
+too small; so the regressors' instruments are made of positions, and made of velocities in a second solution. The truth lies
+between the two where positions are noisy as well, which is why a finding has to be one in both.
 """
 
 from __future__ import annotations
