@@ -192,6 +192,14 @@ def test_factors_of_an_effect_and_of_the_recording_multiply() -> None:
     assert scores.moved[0].found is None
 
 
+def test_an_error_below_what_is_named_counts_as_the_recordings_own() -> None:
+    arm = case((ARM,), [finding("lever_arm", {"x": 1.3, "y": 0.0}, 0.2)])
+    assert score_recorded([plain([]), arm], []).recoveries[0].covered.value == 0.5
+    scores = score_recorded([plain([]), arm], [], {("a", "lever_arm"): {"x": 0.28}})
+    assert scores.recoveries[0].covered.value == 1.0
+    assert scores.recoveries[0].errors == pytest.approx([0.015625])
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("given", "wanted"),

@@ -8,6 +8,7 @@ delay of them all) leaves no trace in them, and only forces can tell: see `ferry
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 from importlib import import_module
@@ -17,6 +18,7 @@ import numpy as np
 
 from ferryid.diagnose.checks.check import Check, SensorFinding
 from ferryid.diagnose.checks.contradiction import opposed
+from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
 from ferryid.errors import FerryIdError
 from ferryid.signals.complementary_filter import MEAN_S, complementary_filter
@@ -26,7 +28,7 @@ from ferryid.signals.smooth import odd_rows, steady_mean
 SPOILS = frozenset({"held_samples", "heading_wrap", "heading_bias", "velocity_scale", "yaw_rate_scale"})
 """Errors that spoil the velocity in products, which is made of position, heading and velocity; small shifts in time do not."""
 
-__all__ = ["Check", "SensorFinding", "checks", "examine", "refilter_velocity"]
+__all__ = ["Check", "SensorFinding", "checks", "examine", "refilter_velocity", "sensor_errors"]
 
 
 @cache
@@ -67,6 +69,17 @@ def examine(measurements: Measurements) -> tuple[tuple[SensorFinding, ...], Meas
             "clocks of the log"
         )
     return tuple(findings), measurements
+
+
+def sensor_errors(measurements: Measurements) -> dict[str, Mapping[str, Estimate]]:
+    """Return what each check estimates, however little it is: effect id to parameters, of those that have a size."""
+    made = dict[str, Mapping[str, Estimate]]()
+    for check in checks():
+        if check.estimate is not None:
+            made[check.id] = check.estimate(measurements)
+        if (finding := check.find(measurements)) is not None:
+            measurements = finding.correct(measurements)
+    return made
 
 
 def refilter_velocity(measurements: Measurements) -> Measurements:

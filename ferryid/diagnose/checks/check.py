@@ -47,9 +47,13 @@ class Check:
         Returns what is wrong with measurements, None where nothing is, or where the measurements cannot tell.
     place
         Checks act in ascending order, each on what those before it corrected.
+    estimate
+        Returns the error's parameters however small it is, as `find` would estimate them; empty where the measurements show
+        none. None of checks whose errors have no size below what is found.
     """
 
     id: str
     title: str
     find: Callable[[Measurements], SensorFinding | None]
     place: int
+    estimate: Callable[[Measurements], Mapping[str, Estimate]] | None = None

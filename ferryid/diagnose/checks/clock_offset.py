@@ -12,6 +12,7 @@ import numpy as np
 from ferryid.diagnose.checks.check import Check, SensorFinding
 from ferryid.diagnose.checks.kinematics import LATE, kinematics
 from ferryid.diagnose.checks.thresholds import CHECKS
+from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
 from ferryid.types import Floats
 from ferryid.vessel.frames import to_body, to_world
@@ -56,4 +57,10 @@ def _earlier(when: Floats, measured: Measurements, nu: Floats) -> Floats:
     return np.column_stack([*to_body(over_ground[:, 0], over_ground[:, 1], measured.psi), nu[:, 2]])
 
 
-CHECK = Check("clock_offset", "Clocks of position and velocity", find, place=30)
+def estimate(measurements: Measurements) -> dict[str, Estimate]:
+    """Return the offset however small; see `find`."""
+    found = kinematics(measurements, (LATE,))
+    return {} if found is None else {"seconds": found.solution.estimate(LATE, "s")}
+
+
+CHECK = Check("clock_offset", "Clocks of position and velocity", find, 30, estimate)

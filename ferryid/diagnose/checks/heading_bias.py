@@ -12,8 +12,9 @@ from math import degrees
 import numpy as np
 
 from ferryid.diagnose.checks.check import Check, SensorFinding
-from ferryid.diagnose.checks.kinematics import ANGLE, kinematics
+from ferryid.diagnose.checks.kinematics import ANGLE, Kinematics, kinematics
 from ferryid.diagnose.checks.thresholds import CHECKS
+from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
 
 
@@ -22,7 +23,7 @@ def find(measurements: Measurements) -> SensorFinding | None:
     found = kinematics(measurements)
     if found is None or not found.found(ANGLE, np.radians(CHECKS.least_angle_deg)):
         return None
-    angle = found.solution.estimate(ANGLE, "deg", degrees(1.0))
+    angle = _angle(found)
     side = "clockwise" if angle.value > 0.0 else "anticlockwise"
     bias = float(found.solution.values[ANGLE])
 
@@ -38,4 +39,14 @@ def find(measurements: Measurements) -> SensorFinding | None:
     )
 
 
-CHECK = Check("heading_bias", "Heading against course over ground", find, place=50)
+def estimate(measurements: Measurements) -> dict[str, Estimate]:
+    """Return the bias however small; see `find`."""
+    found = kinematics(measurements, (ANGLE,))
+    return {} if found is None else {"angle": _angle(found)}
+
+
+def _angle(found: Kinematics) -> Estimate:
+    return found.solution.estimate(ANGLE, "deg", degrees(1.0))
+
+
+CHECK = Check("heading_bias", "Heading against course over ground", find, 50, estimate)

@@ -23,22 +23,14 @@ NAMES = ("north", "east", "heading", "surge", "sway", "yaw rate")
 
 def find(measurements: Measurements) -> SensorFinding | None:
     """Return the share of the log in which some channel is held, and the longest time of it."""
-    columns = np.column_stack([measurements.eta, measurements.nu_raw])
-    held = np.column_stack([held_rows(column, measurements.usable, measurements.step_s) for column in columns.T])
-    # A position is one sample: what repeats in one direction only is motion across it, or a resolution.
-    held[:, :2] &= held[:, :2].all(axis=1, keepdims=True)
-    earlier = taken_out(measurements, columns)
-    found = held | earlier
-    rows = found.any(axis=1)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]]).astype(np.int8))).reshape(-1, 2)
-    share = float(rows.sum()) / len(rows)
-    longest = float((edges[:, 1] - edges[:, 0]).max(initial=0)) * measurements.step_s
-    if share < (CHECKS.long_held_share if longest >= CHECKS.long_held_s else CHECKS.least_held_share):
+    held, every = _held(measurements)
+    rows = np.asarray(every.any(axis=1))
+    edges = _edges(rows)
+    parameters = _parameters(rows, measurements.step_s)
+    percent, longest = parameters["share"].value, parameters["longest"].value
+    if percent < 100.0 * (CHECKS.long_held_share if longest >= CHECKS.long_held_s else CHECKS.least_held_share):
         return None
-    names = [name for name, column in zip(NAMES, found.T, strict=True) if column.any()]
-    percent = 100.0 * share
-    # Each hold began and ended within a row.
-    ends = 100.0 * len(edges) / len(rows)
+    names = [name for name, column in zip(NAMES, every.T, strict=True) if column.any()]
 
     def correct(measured: Measurements) -> Measurements:
         # What was held is bridged: the jump at its end is no motion, and means reach over it.
@@ -48,15 +40,42 @@ def find(measurements: Measurements) -> SensorFinding | None:
 
     return SensorFinding(
         "held_samples",
-        {
-            "share": Estimate(percent, max(percent - ends, 0.0), percent + ends, "%"),
-            "longest": Estimate(longest, max(longest - measurements.step_s, 0.0), longest + measurements.step_s, "s"),
-        },
+        parameters,
         f"Old samples were repeated {counted(len(edges), 'time')}, for up to {longest:.1f} s, "
         f"{percent:.1f} % of the log ({', '.join(names)}).",
         correct,
         {"first_s": measurements.t[edges[:, 0]], "last_s": measurements.t[edges[:, 1] - 1]},
     )
+
+
+def estimate(measurements: Measurements) -> dict[str, Estimate]:
+    """Return the share however small; see `find`."""
+    return _parameters(np.asarray(_held(measurements)[1].any(axis=1)), measurements.step_s)
+
+
+def _held(measurements: Measurements) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return the channels that are held now, and those beside them that were before the log was read, shape (n, 6) each."""
+    columns = np.column_stack([measurements.eta, measurements.nu_raw])
+    held = np.column_stack([held_rows(column, measurements.usable, measurements.step_s) for column in columns.T])
+    # A position is one sample: what repeats in one direction only is motion across it, or a resolution.
+    held[:, :2] &= held[:, :2].all(axis=1, keepdims=True)
+    return held, held | taken_out(measurements, columns)
+
+
+def _edges(rows: NDArray[np.bool_]) -> NDArray[np.int64]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]]).astype(np.int8)))
+    return edges.reshape(-1, 2)
+
+
+def _parameters(rows: NDArray[np.bool_], step_s: float) -> dict[str, Estimate]:
+    """Return share and longest time of the rows that are held; each hold began and ended within a row."""
+    edges = _edges(rows)
+    percent, ends = (100.0 * count / len(rows) for count in (int(rows.sum()), len(edges)))
+    longest = float((edges[:, 1] - edges[:, 0]).max(initial=0)) * step_s
+    return {
+        "share": Estimate(percent, max(percent - ends, 0.0), percent + ends, "%"),
+        "longest": Estimate(longest, max(longest - step_s, 0.0), longest + step_s, "s"),
+    }
 
 
 def held_rows(values: Floats, usable: NDArray[np.bool_], step_s: float) -> NDArray[np.bool_]:
@@ -135,4 +154,4 @@ def _interpolated(values: Floats, usable: NDArray[np.bool_]) -> bool:
     return bool(np.mean(bend <= 1e-3 * size + 1e-12) > CHECKS.straight_share)
 
 
-CHECK = Check("held_samples", "Values held without a measurement", find, place=5)
+CHECK = Check("held_samples", "Values held without a measurement", find, 5, estimate)

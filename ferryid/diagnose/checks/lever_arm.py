@@ -11,8 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from ferryid.diagnose.checks.check import Check, SensorFinding
-from ferryid.diagnose.checks.kinematics import X, Y, kinematics
+from ferryid.diagnose.checks.kinematics import Kinematics, X, Y, kinematics
 from ferryid.diagnose.checks.thresholds import CHECKS
+from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
 from ferryid.vessel.frames import to_world
 
@@ -31,7 +32,7 @@ def find(measurements: Measurements) -> SensorFinding | None:
     least = least_m(measurements)
     if not (found.found(X, least) or found.found(Y, least)):
         return None
-    x, y = found.solution.estimate(X, "m"), found.solution.estimate(Y, "m")
+    x, y = _place(found)
     at = np.array([x.value, y.value])
 
     def correct(measured: Measurements) -> Measurements:
@@ -49,4 +50,14 @@ def find(measurements: Measurements) -> SensorFinding | None:
     )
 
 
-CHECK = Check("lever_arm", "Position against velocity in turns", find, place=60)
+def estimate(measurements: Measurements) -> dict[str, Estimate]:
+    """Return the place however near; see `find`."""
+    found = kinematics(measurements, (X, Y))
+    return {} if found is None else dict(zip("xy", _place(found), strict=True))
+
+
+def _place(found: Kinematics) -> tuple[Estimate, Estimate]:
+    return found.solution.estimate(X, "m"), found.solution.estimate(Y, "m")
+
+
+CHECK = Check("lever_arm", "Position against velocity in turns", find, 60, estimate)

@@ -9,6 +9,7 @@ import numpy as np
 from ferryid.diagnose.checks.check import Check, SensorFinding
 from ferryid.diagnose.checks.kinematics import SCALE, kinematics
 from ferryid.diagnose.checks.thresholds import CHECKS
+from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
 
 UNITS = {
@@ -43,4 +44,10 @@ def find(measurements: Measurements) -> SensorFinding | None:
     )
 
 
-CHECK = Check("velocity_scale", "Position against integrated velocity", find, place=40)
+def estimate(measurements: Measurements) -> dict[str, Estimate]:
+    """Return the factor however near to 1; see `find`."""
+    found = kinematics(measurements, (SCALE,))
+    return {} if found is None else {"factor": found.solution.estimate(SCALE, "-")}
+
+
+CHECK = Check("velocity_scale", "Position against integrated velocity", find, 40, estimate)

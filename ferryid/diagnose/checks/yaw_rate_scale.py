@@ -15,6 +15,7 @@ from ferryid.diagnose.checks.check import Check, SensorFinding
 from ferryid.diagnose.checks.regression import Solution, independence, step
 from ferryid.diagnose.checks.spans import LENGTH_S, STRIDE_S, Spans, spans
 from ferryid.diagnose.checks.thresholds import CHECKS
+from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
 from ferryid.types import Floats
 
@@ -145,4 +146,10 @@ def _growing(power: Floats, by: Floats, overlap: float) -> Floats:
     return np.asarray(level + slope * by + 1e-3 * power.mean() + 1e-18)
 
 
-CHECK = Check("yaw_rate_scale", "Yaw rate against heading", find, place=20)
+def estimate(measurements: Measurements) -> dict[str, Estimate]:
+    """Return the factor however near to 1; see `find`."""
+    rates = compared(measurements)
+    return {} if rates is None else {"factor": rates.solution.estimate(0, "-")}
+
+
+CHECK = Check("yaw_rate_scale", "Yaw rate against heading", find, 20, estimate)

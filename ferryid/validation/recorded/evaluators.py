@@ -101,9 +101,11 @@ class _Proof:
         return [one.why for one in self.not_made]
 
     def score(self, results: Sequence[CaseResult]) -> Any:
+        from ferryid.validation.recorded.own_errors import own_errors
         from ferryid.validation.recorded.scores import score_recorded
 
-        return score_recorded(results, self.not_made)
+        used = {(one.case.path, one.case.truths[0].effect) for one in results if one.case.truths}
+        return score_recorded(results, self.not_made, own_errors(self.recordings, used))
 
 
 def _targets(scores: Any) -> Any:

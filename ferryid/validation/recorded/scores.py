@@ -9,12 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ferryid.json_record import Record
-from ferryid.validation.case import Case
+from ferryid.validation.case import Case, Truth
 from ferryid.validation.detection_curves import Curve, curve
 from ferryid.validation.estimate_errors import EstimateErrors, estimate_errors
 from ferryid.validation.name_scores import HULL, Share, names, outcome_of_missed, wrong_names
 from ferryid.validation.recorded.case_sampling import NotMade
-from ferryid.validation.recorded.effects import concealments
+from ferryid.validation.recorded.effects import Concealment, concealments
+from ferryid.validation.recorded.own_errors import OwnErrors
 from ferryid.validation.records import UNKNOWN, CaseResult, Key
 from ferryid.validation.targets import COVERED, FALSE, IN_TIME, Target, share_target
 
@@ -171,7 +172,9 @@ class RecordedScores(Record):
     seconds: tuple[float, float]
 
 
-def score_recorded(results: Sequence[CaseResult], not_made: Sequence[NotMade]) -> RecordedScores:
+def score_recorded(
+    results: Sequence[CaseResult], not_made: Sequence[NotMade], own: OwnErrors | None = None
+) -> RecordedScores:
     """Return the figures of merit of finished cases, each beside its recording as it was.
 
     Parameters
@@ -180,11 +183,13 @@ def score_recorded(results: Sequence[CaseResult], not_made: Sequence[NotMade]) -
         Of all cases.
     not_made
         What could not be concealed.
+    own
+        What the recordings have of the same errors by themselves; nothing where None.
     """
     plain = {one.case.path: one for one in results if one.case.kind == "clean"}
     altered = [one for one in results if one.case.truths]
     fresh = [one for one in altered if not _present(one, plain[one.case.path])]
-    differences = [difference(one, plain[one.case.path]) for one in fresh]
+    differences = [difference(one, plain[one.case.path], own or {}) for one in fresh]
     wrong = [wrong_names(one) for one in differences]
     gone = [_gone(one, plain[one.case.path]) for one in fresh]
     seconds = [one.diagnosis.seconds for one in results]
@@ -206,12 +211,37 @@ def score_recorded(results: Sequence[CaseResult], not_made: Sequence[NotMade]) -
     )
 
 
-def difference(result: CaseResult, plain: CaseResult) -> CaseResult:
-    """Return a case without the findings that the recording as it was has; a hint there does not excuse a name here."""
+def difference(result: CaseResult, plain: CaseResult, own: OwnErrors | None = None) -> CaseResult:
+    """Return a case without the findings that the recording as it was has; a hint there does not excuse a name here.
+
+    What its estimates are compared with is `expected` of what was concealed.
+    """
     known = set(names(plain))
     kept = tuple(one for one in result.diagnosis.findings if one.key not in known or one.key == result.truths[0].key)
     case = replace(result.case, allowed=(*result.case.allowed, HULL))
-    return replace(result, case=case, diagnosis=replace(result.diagnosis, findings=kept))
+    truth = result.truths[0]
+    realised = {truth.effect: expected(truth, plain, own or {})}
+    return replace(result, case=case, realised=realised, diagnosis=replace(result.diagnosis, findings=kept))
+
+
+def expected(truth: Truth, plain: CaseResult, own: OwnErrors) -> dict[str, float]:
+    """Return the parameters to be found: what was concealed beside what the recording has of it by itself.
+
+    That is the estimate in the recording as it was, of a finding or a hint, or of a sensor check that finds none. A factor is
+    multiplied, anything else is added.
+    """
+    known = concealments()[truth.effect]
+    before = next((one for one in plain.diagnosis.findings if one.key == truth.key), None)
+    mine = own.get((plain.case.path, truth.effect), {})
+    if before is not None:
+        mine = {name: one.value for name, one in before.parameters.items()}
+    return {name: _together(value, mine.get(name), known) for name, value in truth.values.items()}
+
+
+def _together(concealed: float, own: float | None, known: Concealment) -> float:
+    if own is None or known.positions:
+        return concealed
+    return own * concealed if known.neutral == 1.0 else own + concealed
 
 
 def label(key: Key) -> str:
@@ -323,8 +353,8 @@ def _moved(result: CaseResult, plain: CaseResult) -> list[Moved]:
         own = before.parameters[name].value
         found = None if after is None else after.parameters.get(name)
         numbers = (None, None, None) if found is None else (found.value, found.low, found.high)
-        expected = own * value if known.neutral == 1.0 else own + value
-        made.append(Moved(label(truth.key), result.case.path, name, own, value, expected, *numbers))
+        there = _together(value, own, known)
+        made.append(Moved(label(truth.key), result.case.path, name, own, value, there, *numbers))
     return made
 
 
