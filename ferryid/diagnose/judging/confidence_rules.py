@@ -292,7 +292,9 @@ def out_of_step_beside_disturbance(finding: Finding, context: Context, threshold
     A controller answers every gust some time after it has moved the vessel, so that force and motion seem to be out of step.
     That explains little of what moves the vessel: what removes most of the error is no such thing.
     """
-    removes = max(context.own.removed.values(), default=0.0)
+    # A property of all logs removes over all of them, and is the same in each.
+    removed = finding.improvement if context.own.kind == "property" else context.own.removed
+    removes = max(removed.values(), default=0.0)
     if not context.log.unsteady or finding.effect not in OUT_OF_STEP or removes >= threshold:
         return finding, ""
     here = context.log.setting

@@ -271,6 +271,12 @@ def test_what_a_controllers_answer_looks_like_is_a_hint_beside_gusts(effect: str
     assert stands(out_of_step_beside_disturbance, found(effect), context(0.3, unsteady=False))
 
 
+@pytest.mark.parametrize(("share", "sure"), [(0.3, False), (0.6, True)])
+def test_a_lag_of_all_logs_removes_over_all_of_them(share: float, sure: bool) -> None:
+    lag = replace(found("thruster_lag"), improvement={"yaw": share})
+    assert stands(out_of_step_beside_disturbance, lag, Context(Figures("property"), LogFigures(unsteady=True))) == sure
+
+
 @pytest.mark.parametrize(
     ("showing", "logs", "sure"), [(1, 4, False), (2, 4, True), (1, 3, False), (1, 2, True), (1, 1, True)]
 )
