@@ -36,6 +36,7 @@ NO_DECISION = {
         signals.smooth _AXIS_OF
         diagnose.checks.kinematics SCALE ANGLE X Y LATE NORTH EAST NEUTRAL
         diagnose.checks.yaw_rate_scale NEUTRAL SIZE
+        diagnose.data.measurements CHANNELS
         diagnose.second_sources.fit SCALE ANGLE X Y LATE BIAS BIAS_2 NEUTRAL OF_VECTORS OF_SCALARS FLOORS
         diagnose.second_sources.pairs NORTH EAST PSI U V R
         diagnose.inference.kalman CHANNEL_STATES DIFFUSE
