@@ -357,6 +357,12 @@ def write_text(path: Path, text: str) -> None:
         temporary.write_text(text, encoding="utf-8", errors="backslashreplace")
 
 
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a file in one step: it is there whole, or not at all."""
+    with replacing(path) as temporary:
+        temporary.write_bytes(content)
+
+
 def check_result(path: Path) -> bool:
     """Refuse a place for a JSON result that holds anything but an earlier one; tell whether it is a device.
 

@@ -15,7 +15,7 @@ TOLERANCE = 1e-9
 """By how much a copy may be off, as a part of the largest value of the same kind."""
 WORST_CONDITION = 1e6
 """Condition number, units apart, from which on a mass matrix is as good as singular."""
-_USUAL = {"u": 1.0, "v": 0.5, "r": 0.2, "u_dot": 0.1, "v_dot": 0.1, "r_dot": 0.05}
+USUAL = {"u": 1.0, "v": 0.5, "r": 0.2, "u_dot": 0.1, "v_dot": 0.1, "r_dot": 0.05}
 """Reach of a state where the model does not tell its range."""
 
 
@@ -124,7 +124,7 @@ def _reach(
 ) -> Floats:
     def most(name: str) -> float:
         known = max(abs(end) for end in ranges.get(name, (0.0, 0.0)))
-        return known if known > 0.0 else _USUAL[name]
+        return known if known > 0.0 else USUAL[name]
 
     return np.array([_short(part * most(name)) for name, part in zip(names, parts, strict=True)])
 

@@ -11,6 +11,7 @@ from ferryid.errors import FerryIdError
 from ferryid.export.formats import formats
 from ferryid.export.log_file import export_log
 from ferryid.export.model_file import export_model
+from ferryid.export.sdf import shares
 from ferryid.files import check_result
 from ferryid.models.store import load
 from ferryid.types import TimeRanges, no_progress
@@ -103,6 +104,17 @@ def export(
     )
 
 
+def _check_lines(check: Mapping[str, Any] | None) -> list[str]:
+    """Return what the program that a form is for makes of the numbers."""
+    if check is None:
+        return []
+    error = check["error_share"]
+    lines = [f"  error of the force by the equations of {check['equations']}: {shares(error['velocity'])}"]
+    if any(error["acceleration"].values()):
+        lines.append(f"  of the inertia: {shares(error['acceleration'])}")
+    return [*lines, *(f"  no term for {part['what']}: {shares(part['share'])}" for part in check["missing"])]
+
+
 def _check_apart(json: Path, others: list[Path]) -> None:
     if any(json.resolve() == one.resolve() for one in others):
         raise FerryIdError(f"{json}: cannot be the place of two files. Fix: give --json another name")
@@ -120,6 +132,7 @@ def render_export(result: Mapping[str, Any]) -> str:
         model = result["model"]
         lines = [f"{result['file']}: {model['name']}@{model['version']} as {form.title}"]
         lines += [f"  {effect['acts_on']}: {effect['says']}" for effect in result["effects"]]
+        lines += _check_lines(result.get("check"))
         return "\n".join([*lines, form.hint.format(file=result["file"], name=result["name"])])
     used = len(result["topics"])
     lines = [f"{result['file']}: {result['log']['name']}, {counted(used, 'topic')} for PlotJuggler or Foxglove"]

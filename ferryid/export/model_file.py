@@ -13,7 +13,7 @@ from ferryid.export.format import Format
 from ferryid.export.formats import formats
 from ferryid.export.names import identifier
 from ferryid.export.words import MARK
-from ferryid.files import taken, unwritable, write_text
+from ferryid.files import taken, unwritable, write_bytes
 from ferryid.models.store import find, load_file
 
 SCHEMA = "ferryid.export/1"
@@ -59,14 +59,15 @@ def export_model(
         name = _name_of(place, form)
     one = exported(model, hashlib.sha256(source.read_bytes()).hexdigest(), name)
     text = form.render(one)
-    _check_place(place, source, text, overwrite=overwrite or file is None)
-    write_text(place, text)
+    content = text.encode() if isinstance(text, str) else text
+    _check_place(place, source, content, overwrite=overwrite or file is None)
+    write_bytes(place, content)
     return {
         "schema": SCHEMA,
         "kind": "model",
         "format": form.name,
         "file": str(place),
-        "sha256": hashlib.sha256(text.encode()).hexdigest(),
+        "sha256": hashlib.sha256(content).hexdigest(),
         "name": one.name,
         "model": {
             "name": model.name,
@@ -78,6 +79,7 @@ def export_model(
         "cases": len(one.cases),
         "warnings": list(one.warnings()),
         "left_out": list(one.left_out()),
+        **({} if form.check is None else {"check": form.check(one, str(text))}),
     }
 
 
@@ -107,7 +109,7 @@ def _name_of(place: Path, form: Format) -> str:
     return place.stem
 
 
-def _check_place(place: Path, source: Path, text: str, *, overwrite: bool) -> None:
+def _check_place(place: Path, source: Path, content: bytes, *, overwrite: bool) -> None:
     """Refuse to write over a model, over anything that is no export, and unasked over anything else than the same."""
     try:
         if not place.exists():
@@ -118,7 +120,7 @@ def _check_place(place: Path, source: Path, text: str, *, overwrite: bool) -> No
             start = there.read(_HEAD_BYTES)
         if place.samefile(source) or (start and MARK.encode() not in start):
             raise FerryIdError(f"{place}: cannot be replaced, found no export. Fix: give --file another name")
-        if not overwrite and place.read_bytes() != text.encode():
+        if not overwrite and place.read_bytes() != content:
             raise taken(place)
     except OSError as error:
         raise unwritable(place, error) from error
