@@ -1,7 +1,7 @@
 """What SDF files of a vessel have in common: a comment, a hull that floats, thrusters on joints, and the plane in them.
 
-Gazebo's frames: x ahead, y to port, z up (FLU) in a world of east, north, up. The link's origin is ferryid's body origin, in the
-waterline. Only the motion in the plane is identified; what heave, roll and pitch need is assumed, and marked as such.
+Gazebo's frames: x ahead, y to port, z up (FLU) in a world of east, north, up. The link's origin is ferryid's body origin, in
+the waterline. Only the motion in the plane is identified; what heave, roll and pitch need is assumed, and marked as such.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ def shares(values: Mapping[str, float] | Floats) -> str:
     return ", ".join(f"{axis} {100.0 * round(value, 5):.2g} %" for axis, value in zip(AXES, numbers, strict=True))
 
 
-def inertial_lines(one: Inertial, added: Mapping[str, float] = {}) -> list[str]:  # noqa: B006 - never changed
+def inertial_lines(one: Inertial, added: Mapping[str, float] | None = None) -> list[str]:
     """Return the element ``inertial``; `added` are the entries of ``fluid_added_mass``."""
     ixx, iyy, izz = one.moments
     lines = [
@@ -183,7 +183,9 @@ def _place(model: ET.Element, link: ET.Element) -> list[float]:
     """Return where a link is, x and y [m] in the hull's link; what it hangs on is not turned."""
     pose = link.find("pose")
     on = None if pose is None else model.find(f"link[@name='{pose.get('relative_to')}']")
-    return np.add(_pose(link), [0.0, 0.0] if on is None else _place(model, on)).tolist()
+    x, y = _pose(link)
+    on_x, on_y = (0.0, 0.0) if on is None else _place(model, on)
+    return [x + on_x, y + on_y]
 
 
 def _pose(element: ET.Element) -> list[float]:

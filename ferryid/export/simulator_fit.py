@@ -157,15 +157,20 @@ def _fitted(kept: PlanarTerms, slots: Slots, nu: Floats, rest: Floats) -> Planar
         if not mine or not np.any(rest[:, axis]):
             continue
         columns = np.column_stack([nu[:, j] if k is None else nu[:, j] * np.abs(nu[:, k]) for _, j, k in mine])
+        # What the other velocities do by themselves is not to be taken for a damping of this one.
+        others = [(j, k) for j in range(3) for k in range(j, 3) if axis not in (j, k)]
+        beside = np.column_stack([np.ones(len(nu)), *(nu[:, j] * nu[:, k] for j, k in others)])
+        columns = np.column_stack([columns, beside])
         size = np.linalg.norm(columns, axis=0)
         exact = [float(made.linear[axis, j] if k is None else made.absolute[axis, j, k]) for _, j, k in mine]
         diagonal = [j == axis and k in (None, axis) for _, j, k in mine]
         low = [-max(0.0, value) if own else -np.inf for value, own in zip(exact, diagonal, strict=True)]
+        low += [-np.inf] * beside.shape[1]
         # A bound of zero width is none that the solver takes.
         found = (
             lsq_linear(columns / size, rest[:, axis], (np.minimum(low * size, -np.finfo(float).tiny), np.inf)).x / size
         )
-        for (_, j, k), value in zip(mine, found.tolist(), strict=True):
+        for (_, j, k), value in zip(mine, found.tolist()[: len(mine)], strict=True):
             if k is None:
                 made.linear[axis, j] += value
             else:

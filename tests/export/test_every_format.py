@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import ast
+import io
 import pkgutil
+import re
+import xml.etree.ElementTree as ET
+import zipfile
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -47,14 +52,46 @@ def test_the_same_model_gives_the_same_bytes_anywhere(name: str, tmp_path: Path)
         assert told in texts[0], told
 
 
+def inside(archive: bytes) -> Iterator[str]:
+    """Yield the texts of an archive."""
+    with zipfile.ZipFile(io.BytesIO(archive)) as made:
+        for name in made.namelist():
+            text = made.read(name).decode()
+            if name.endswith(".xml"):
+                ET.fromstring(text)
+            yield text
+
+
+@pytest.mark.parametrize("name", [name for name, form in formats().items() if form.check is not None])
+@pytest.mark.parametrize("model", ["no basis", "factors", "paper flows", "centre ahead", "cross flow everywhere"])
+def test_parameters_for_another_program_state_their_error(name: str, model: str) -> None:
+    one = exported(MODELS[model], SHA)
+    form = formats()[name]
+    text = form.render(one)
+    checked = form.check(one, text)
+    assert all(0.0 <= value < 3.0 for of in checked["error_share"].values() for value in of.values())
+    assert checked["missing"], "every hull here has more than the program"
+    assert all(term in text for term in checked["terms"])
+    # What is counted as missing is what the errors are made of.
+    for axis, error in checked["error_share"]["velocity"].items():
+        assert error <= sum(part["share"][axis] for part in checked["missing"]) + 1e-9
+    term = checked["terms"][-1]
+    wrong = re.sub(f"<{term}>.*</{term}>", f"<{term}>1e9</{term}>", text)
+    assert form.check(one, wrong)["error_share"]["velocity"]["yaw"] > 10.0
+
+
 @pytest.mark.parametrize("name", FORMATS)
 def test_foreign_text_stays_a_comment(name: str) -> None:
     nasty = replace(MODELS["no basis"], name='*/ "x\'\n#error {boom} \\ % ??/ """ æøå')
     text = formats()[name].render(exported(nasty, SHA))
+    if isinstance(text, bytes):
+        text = "".join(inside(text))
     assert text.isascii()
     assert "\n#error" not in text
     if name == "python":
         ast.parse(text)
+    if name in ("gazebo", "px4"):
+        assert next(iter(ET.fromstring(text))).tag == "model"
     if name == "c":
         assert text.count("*/") == text.count("/*")
         assert "\\" not in text

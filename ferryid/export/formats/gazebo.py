@@ -89,10 +89,9 @@ def equations(text: str) -> tuple[Floats, Any]:
     assert model is not None
     link = model.find(f"link[@name='{LINK}']/inertial/fluid_added_mass")
     plugin = model.find("plugin[@name='gz::sim::systems::Hydrodynamics']")
-    assert link is not None
     assert plugin is not None
     mirror = np.array(MIRROR)
-    entries = numbers(link)
+    entries = {} if link is None else numbers(link)
     added = np.zeros((3, 3))
     for (i, j), key in _PLANE.items():
         added[i, j] = added[j, i] = entries.get(key, 0.0)
@@ -109,7 +108,7 @@ def equations(text: str) -> tuple[Floats, Any]:
                     damping += values.get(f"{axis}{velocity}abs{other}", 0.0) * np.abs(state[:, k])
                     damping += values.get(f"{axis}{velocity}{other}", 0.0) * state[:, k]
                 applied[:, i] += damping * state[:, j]
-        return coriolis(mass).force(nu) - applied * mirror
+        return np.asarray(coriolis(mass).force(nu) - applied * mirror)
 
     return mass, simulated
 
@@ -225,7 +224,7 @@ def _diameter(actuator: Actuator) -> float:
 
 
 def _curve(actuator: Actuator) -> tuple[float, float, float, float] | None:
-    """Return least and greatest force [N], the coefficient of the plugin's square law, and by what part of the greatest it errs.
+    """Return least and greatest force [N], the coefficient of the plugin's square law, and its error over the greatest force.
 
     The law is ``T = rho K D^4 omega |omega|``; the plugin uses it for the speed of the blades alone, as thrust is what is
     ordered.
@@ -234,7 +233,7 @@ def _curve(actuator: Actuator) -> tuple[float, float, float, float] | None:
         return None
     to_rpm = 60.0 if actuator.thrust.input_unit == "rps" else 1.0
     ends = [end * to_rpm if math.isfinite(end) else math.copysign(_MOST_RPM, end) for end in actuator.thrust.valid]
-    rpm = np.linspace(*ends, _CURVE_ROWS)
+    rpm = np.linspace(ends[0], ends[1], _CURVE_ROWS)
     force, _ = thrust(
         actuator.thrust, rpm, diameter_m=actuator.inflow.get("diameter_m", math.nan), water_density=_density(actuator)
     )

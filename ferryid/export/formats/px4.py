@@ -1,8 +1,8 @@
 """PX4: the link and the parameters of its plugin for surface vehicles in Gazebo, ``custom::UsvDynamics``.
 
-Source: PX4-Autopilot, ``src/modules/simulation/gz_plugins/usv_dynamics/UsvDynamics.cpp``, a port of the plugin of Gazebo Classic. It
-applies ``-diag(xDotU, yDotV, nDotR) nu_dot - diag(xU + xUU |u|, yV + yVV |v|, nR + nRR |r|) nu`` at the origin of the link, with
-the acceleration of the step before. A Coriolis matrix of the added mass is computed there and not used.
+Source: PX4-Autopilot, ``src/modules/simulation/gz_plugins/usv_dynamics/UsvDynamics.cpp``, as once in Gazebo Classic. It applies
+``-diag(xDotU, yDotV, nDotR) nu_dot - diag(xU + xUU |u|, yV + yVV |v|, nR + nRR |r|) nu`` at the origin of the link, with the
+acceleration of the step before. A Coriolis matrix of the added mass is computed there and not used.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def equations(text: str) -> tuple[Floats, Any]:
         damping = np.array([values[key] for key in _LINEAR]) + np.array([values[key] for key in _QUADRATIC]) * np.abs(
             state
         )
-        return coriolis(rigid).force(nu) + damping * state * mirror
+        return np.asarray(coriolis(rigid).force(nu) + damping * state * mirror)
 
     return rigid + np.diag([values[key] for key in _ADDED]), simulated
 
@@ -145,10 +145,10 @@ def _afloat(floating: Box, moving: Inertial) -> dict[str, float]:
 
 def _how_to_use() -> Iterator[str]:
     told = (
-        "For gz_boat of PX4 1.16 or newer in place of its link and its plugin. Frames are Gazebo's, x ahead, y to port, z up, with "
+        "For PX4's gz_boat, in place of its link and its plugin. Frames are Gazebo's, x ahead, y to port, z up, with "
         f"{LINK} at the body origin below in the waterline at z = 0; wherever this head names another frame, it is ferryid's.",
-        "Used are xDotU, yDotV, xU, xUU, yV, yVV, nR, nRR. All inertia in yaw is the link's, so nDotR is 0. The plugin computes the "
-        "Coriolis force of the added mass and does not apply it, and knows no current.",
+        "Used are xDotU, yDotV, xU, xUU, yV, yVV, nR, nRR. All inertia in yaw is the link's, so nDotR is 0. The plugin "
+        "computes the Coriolis force of the added mass and does not apply it, and knows no current.",
         "waterLevel is half a radius above the water, as the plugin counts the depth of its hulls from the link's origin.",
         "Motors are PX4's own, and are not exported.",
     )
@@ -176,7 +176,7 @@ def _unstable(one: Exported) -> Iterator[str]:
     mass = one.force.profile.hull.mass_kg
     for name, value in _parameters(one).items():
         if name in _ADDED and abs(value) >= mass:
-            yield f"{name} is not below the mass of the link: the plugin takes the acceleration of the step before, and runs away"
+            yield f"{name} is not below the mass of the link: the plugin, a step late with it, runs away"
 
 
 FORMAT = Format(
