@@ -137,6 +137,7 @@ def render_export(result: Mapping[str, Any]) -> str:
     used = len(result["topics"])
     lines = [f"{result['file']}: {result['log']['name']}, {counted(used, 'topic')} for PlotJuggler or Foxglove"]
     lines += [f"  {one['topic']:<26}{one['messages']:>9}  {one['type']}" for one in result["topics"]]
+    lines += [f"  {place}" for place in result["layouts"]]
     if result["rows_left_out"]:
         lines.append(
             f"  {result['rows_left_out']} of {counted(result['rows'], 'row')} "

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
 from ferryid.export.findings import diagnostics, read_diagnosis, told_by
+from ferryid.export.layouts import check_layouts, foxglove, layout_files, plotjuggler
 from ferryid.export.model_file import SCHEMA
-from ferryid.files import replacing
+from ferryid.files import replacing, write_text
 from ferryid.models import Model
 from ferryid.models.forces import base_force
 from ferryid.models.prediction import Prediction, predict, predict_base, signal_map
@@ -119,6 +120,10 @@ def export_log(
     _check_any(streams, prepared)
     with replacing(mcap, new=not overwrite) as temporary:
         write_mcap(streams, temporary, CHUNK_BYTES)
+    topics = [one.topic for one in streams]
+    layouts = layout_files(mcap)
+    for place, text in zip(layouts, (plotjuggler(topics, mcap), foxglove(topics)), strict=True):
+        write_text(place, text)
     return {
         "schema": SCHEMA,
         "kind": "log",
@@ -129,6 +134,7 @@ def export_log(
         "window_s": window_s,
         "start_ns": track.t0_ns,
         "topics": [{"topic": one.topic, "type": one.type, "messages": len(one.stamp_ns)} for one in streams],
+        "layouts": [str(place) for place in layouts],
         "rows": len(motion.t),
         "rows_left_out": int((~_known(motion, motion.nu)).sum()),
         "warnings": [*prepared.doubts, *prepared.left_out, *(() if estimated is None else estimated.idle)],
@@ -144,6 +150,7 @@ def _check_place(log: str, mcap: Path, *, overwrite: bool) -> None:
         if one.is_dir() and mcap.resolve().is_relative_to(one.resolve()):
             raise FerryIdError(f"{mcap}: lies in the log that it is made from, {one}. Fix: give it another place")
     check_output(mcap, overwrite=overwrite, inputs=read)
+    check_layouts(mcap)
     if mcap.is_file() and not _is_export(mcap):
         raise FerryIdError(f"{mcap}: cannot be replaced, found no export. Fix: give --mcap another name")
 

@@ -28,7 +28,10 @@ def out(tmp_path: Path) -> Path:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("form", "suffix"),
-    [("c", ".h"), ("matlab", ".m"), ("python", ".py"), ("ros2", ".yaml")],
+    [
+        *(("c", ".h"), ("fmi3", ".fmu"), ("gazebo", ".sdf"), ("matlab", ".m")),
+        *(("px4", ".sdf"), ("python", ".py"), ("ros2", ".yaml")),
+    ],
 )
 def test_a_model_in_every_form(ferryid, out: Path, form: str, suffix: str) -> None:
     file = f"milliampere_v2{suffix}"
@@ -41,6 +44,11 @@ def test_a_model_in_every_form(ferryid, out: Path, form: str, suffix: str) -> No
     source = out / "models" / "milliampere" / "2.json"
     assert told["model"]["sha256"] == hashlib.sha256(source.read_bytes()).hexdigest()
     assert {one["acts_on"] for one in told["effects"]} == {"hull", "thrusters", "sensors"}
+    if form in ("gazebo", "px4"):
+        assert "error of the force by the equations of" in ferryid(
+            "export", "milliampere@2", "--to", form, "--out", out
+        ).out
+        assert told["check"]["missing"]
     # What stays behind is told where results do not go.
     assert "not exported: steady wind of the log trial" in run.err
     assert told["left_out"]
@@ -86,7 +94,7 @@ def test_a_log_for_a_viewer(ferryid, fixtures: Path, out: Path, tmp_path: Path) 
         (("milliampere", "--to", "pyton"), 'Did you mean "python"'),
         (("miliampere", "--to", "c"), 'Did you mean "milliampere"'),
         (("milliampere@9", "--to", "c"), "there are 1, 2, 3"),
-        (("milliampere",), "--to c|matlab|python|ros2 for a model, --mcap FILE for a log"),
+        (("milliampere",), "--to c|fmi3|gazebo|matlab|px4|python|ros2 for a model, --mcap FILE for a log"),
         (("milliampere", "--to", "c", "--vessel", "milliampere"), "--vessel: is for a log"),
         (("milliampere", "--to", "c", "--model", "milliampere"), "--model: is for a log"),
         (("milliampere", "--diagnosis", "d.json"), "--diagnosis: is for a log"),

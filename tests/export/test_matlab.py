@@ -27,6 +27,7 @@ def octave(folder: Path, commands: str) -> str:
     return run.stdout + run.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MODELS)
 def test_it_gives_the_acceleration_under_a_force(name: str, tmp_path: Path) -> None:
     model = MODELS[name]
