@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ferryid.cli.completion import model_or_log
 from ferryid.cli.options import OUT, From, Json, ModelVessel, Out, To, ranges
 from ferryid.cli.output import emit, progress, tell
 from ferryid.cli.several import several_after
@@ -15,7 +16,12 @@ Command = several_after("--on")
 
 
 def command(
-    models: Annotated[list[str], typer.Argument(help="Two or more models, before --on: path, name or name@version.")],
+    models: Annotated[
+        list[str],
+        typer.Argument(
+            autocompletion=model_or_log, help="Two or more models, before --on: path, name or name@version."
+        ),
+    ],
     on: Annotated[
         list[str] | None,
         typer.Option(

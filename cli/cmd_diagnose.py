@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ferryid.cli.completion import model_names
 from ferryid.cli.options import OUT, From, Json, Logs, Out, To, Verify, Vessel, ranges
 from ferryid.cli.output import emit, progress, tell
 from ferryid.cli.several import several_after
@@ -20,7 +21,11 @@ def command(
     from_: From = None,
     to: To = None,
     model: Annotated[
-        str | None, typer.Option(help="Model to examine: path, name or name@version; the profile's hull if left out.")
+        str | None,
+        typer.Option(
+            autocompletion=model_names,
+            help="Model to examine: path, name or name@version; the profile's hull if left out.",
+        ),
     ] = None,
     against: Annotated[
         str | None,

@@ -6,12 +6,15 @@ from typing import Annotated
 
 import typer
 
+from ferryid.cli.completion import model_names
 from ferryid.cli.options import OUT, From, Json, Logs, ModelVessel, Out, To, ranges
 from ferryid.cli.output import emit, progress, tell
 
 
 def command(
-    model: Annotated[str, typer.Argument(help="Path of a model file, name, or name@version.")],
+    model: Annotated[
+        str, typer.Argument(autocompletion=model_names, help="Path of a model file, name, or name@version.")
+    ],
     logs: Logs,
     vessel: ModelVessel = None,
     from_: From = None,

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ferryid.cli.completion import format_names, model_names, model_or_log
 from ferryid.cli.options import OUT, From, Json, Out, Vessel, ranges
 from ferryid.cli.output import emit, progress, tell
 from ferryid.export.formats import names
@@ -14,14 +15,25 @@ from ferryid.export.formats import names
 
 def command(
     what: Annotated[
-        str, typer.Argument(metavar="MODEL|LOG", help="Path, name or name@version of a model; with --mcap a log.")
+        str,
+        typer.Argument(
+            autocompletion=model_or_log,
+            metavar="MODEL|LOG",
+            help="Path, name or name@version of a model; with --mcap a log.",
+        ),
     ],
     to: Annotated[
-        str | None, typer.Option(help=f"Form of a model: {', '.join(names())}; with --mcap the end of the range.")
+        str | None,
+        typer.Option(
+            autocompletion=format_names,
+            help=f"Form of a model: {', '.join(names())}; with --mcap the end of the range.",
+        ),
     ] = None,
     file: Annotated[Path | None, typer.Option(help="File for a model; one in exports/ of --out if left out.")] = None,
     mcap: Annotated[Path | None, typer.Option(help="MCAP file for a log: its forces, motion and findings.")] = None,
-    model: Annotated[str | None, typer.Option(help="With --mcap: the model to compare with the log.")] = None,
+    model: Annotated[
+        str | None, typer.Option(autocompletion=model_names, help="With --mcap: the model to compare with the log.")
+    ] = None,
     vessel: Vessel = None,
     from_: From = None,
     diagnosis: Annotated[Path | None, typer.Option(help="With --mcap: JSON of ferryid diagnose on this log.")] = None,

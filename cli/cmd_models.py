@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ferryid.cli.completion import model_or_log
 from ferryid.cli.options import OUT, From, Json, ModelVessel, Out, ranges
 from ferryid.cli.output import emit, progress, tell
 from ferryid.errors import FerryIdError
@@ -19,6 +20,7 @@ def command(
     words: Annotated[
         list[str] | None,
         typer.Argument(
+            autocompletion=model_or_log,
             metavar="[MODEL | promote NAME@V [LOG...] | rollback NAME]",
             help="A name, name@version or path to show, and none to list all; or which version is to become current: "
             "one that is replayed on logs against the present one, or the one before.",

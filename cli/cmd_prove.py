@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ferryid.cli.completion import effect_names
 from ferryid.cli.options import OUT, Json, Out, Vessel
 from ferryid.cli.output import emit, progress, tell
 
@@ -19,7 +20,8 @@ def command(
     only: Annotated[
         str,
         typer.Option(
-            help="Cells (wind, clean, ...: see the page) or kinds of them, with commas between; all if left out."
+            autocompletion=effect_names,
+            help="Cells (wind, clean, ...: see the page) or kinds of them, with commas between; all if left out.",
         ),
     ] = "",
     processes: Annotated[int, typer.Option(help="Processes to share the work among.")] = 2,

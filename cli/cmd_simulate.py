@@ -7,12 +7,16 @@ from typing import Annotated
 
 import typer
 
+from ferryid.cli.completion import model_names, scenario_names
 from ferryid.cli.options import OUT, Json
 from ferryid.cli.output import emit, progress
 
 
 def command(
-    scenario: Annotated[str, typer.Argument(help="Name of a bundled scenario, or the path of a TOML file.")] = "",
+    scenario: Annotated[
+        str,
+        typer.Argument(autocompletion=scenario_names, help="Name of a bundled scenario, or the path of a TOML file."),
+    ] = "",
     out: Annotated[Path, typer.Option("--out", help="Folder for the log, which is SCENARIO.mcap there.")] = OUT,
     log: Annotated[
         Path | None, typer.Option("--log", help="Log to write instead: .mcap, .bag (ROS1), or a folder (ROS2).")
@@ -23,7 +27,8 @@ def command(
     model: Annotated[
         str | None,
         typer.Option(
-            help="A diagnosed model that is the vessel: path, name or name@version. Its effects act, its hull moves."
+            autocompletion=model_names,
+            help="A diagnosed model that is the vessel: path, name or name@version. Its effects act, its hull moves.",
         ),
     ] = None,
     conditions: Annotated[

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ferryid.cli.options import From, Json, To, ranges, vessel_names
+from ferryid.cli.completion import vessel_names
+from ferryid.cli.options import From, Json, To, ranges
 from ferryid.cli.output import emit, progress, tell
 
 if TYPE_CHECKING:

@@ -72,7 +72,8 @@ def _run() -> object:
     import warnings
 
     from ferryid import interrupts
-    from ferryid.errors import FerryIdError, one_line
+    from ferryid.cli.error_pages import MEMORY, PLACE, section, see
+    from ferryid.errors import FerryIdError, UnwritableError, one_line
 
     # What NumPy cannot compute becomes NaN, and is told where it matters.
     warnings.simplefilter("ignore", RuntimeWarning)
@@ -89,7 +90,8 @@ def _run() -> object:
         return _usage(error)
     except FerryIdError as error:
         if not interrupts.received():
-            sys.stderr.write(f"ferryid: {error}\n")
+            where = PLACE if isinstance(error, UnwritableError) else section(error)
+            sys.stderr.write(f"ferryid: {error}{see(where)}\n")
         return 2
     except BrokenPipeError:
         # The reader of our output (head, less) has gone: nothing to say and nobody to say it to.
@@ -98,11 +100,14 @@ def _run() -> object:
     except OSError as error:
         what = f"{error.filename}: " if error.filename else ""
         sys.stderr.write(
-            f"ferryid: {one_line(f'{what}{error.strerror or error}')}. Fix: check the path, its permissions and the disk\n"
+            f"ferryid: {one_line(f'{what}{error.strerror or error}')}. Fix: check the path, its permissions and the disk"
+            f"{see(PLACE)}\n"
         )
         return 2
     except MemoryError:
-        sys.stderr.write("ferryid: there is not enough memory for this log. Fix: cut it, or give a lower --rate\n")
+        sys.stderr.write(
+            f"ferryid: there is not enough memory for this log. Fix: cut it, or give a lower --rate{see(MEMORY)}\n"
+        )
         return 2
     except Exception:  # noqa: BLE001 - the last boundary: what arrives here is a bug and is shown as one
         # Libraries make errors of their own of an interrupt.
@@ -129,6 +134,7 @@ def _open_streams() -> None:
 
 def _usage(error: TyperException) -> int:
     """Show wrong use of the command line in one line; asking for nothing at all shows the help."""
+    from ferryid.cli.error_pages import OPTION, see
     from ferryid.errors import one_line, printable
 
     message = error.format_message() if hasattr(error, "format_message") else str(error)
@@ -137,5 +143,5 @@ def _usage(error: TyperException) -> int:
         return 2
     context = getattr(error, "ctx", None)
     command = context.command_path if context else "ferryid"
-    sys.stderr.write(f"ferryid: {one_line(message.rstrip('.'))}. Fix: see {command} --help\n")
+    sys.stderr.write(f"ferryid: {one_line(message.rstrip('.'))}. Fix: see {command} --help{see(OPTION)}\n")
     return 2

@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from ferryid.cli import completion
+from ferryid.cli.completion import vessel_names
 from ferryid.errors import FerryIdError
 from ferryid.regression.bases import basis_names
 
@@ -19,13 +21,6 @@ MaybeLogs = Annotated[
     list[str] | None,
     typer.Argument(help="Bags, MCAP files, CSV or Parquet tables, or folders; parts of one log joined by +."),
 ]
-
-
-def vessel_names(incomplete: str) -> list[str]:
-    """Return the names of profiles that begin so, for the completion of a shell."""
-    from ferryid.vessel import known
-
-    return [name for name in known() if name.startswith(incomplete)]
 
 
 Vessel = Annotated[
@@ -100,7 +95,7 @@ Delta = Annotated[float, typer.Option("--delta", help="Factor on the base model'
 Sigma = Annotated[float, typer.Option("--sigma", help="Factor on the base model's D.")]
 Zeta = Annotated[float, typer.Option("--zeta", help="Factor on the base model's force.")]
 
-OUT = Path("ferryid-out")
+OUT = completion.OUT
 
 
 def ranges(first: str | None, last: str | None) -> Sequence[tuple[str | float | None, str | float | None]]:

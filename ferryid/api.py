@@ -37,6 +37,7 @@ __all__ = [
     "compare",
     "compare_groups",
     "diagnose",
+    "doctor",
     "evaluate",
     "export",
     "fit",
@@ -547,6 +548,14 @@ def export(
     )  # fmt: skip
     progress("")
     return _outcome(result, render_export(result))
+
+
+def doctor(out: str | Path = OUT) -> Outcome:
+    """Return the state of this installation; ``json["problems"]`` is empty where every command can run."""
+    from ferryid.doctor import examine, render
+
+    result = examine(Path(out))
+    return _outcome(result, render(result))
 
 
 def models(out: str | Path = OUT) -> Outcome:

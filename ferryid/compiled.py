@@ -13,6 +13,7 @@ import re
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 from types import CodeType, ModuleType
@@ -207,6 +208,27 @@ def borrowing(function: Callable[P, R]) -> Callable[P, R]:
     refuses to compile a function this way that makes an array, a slice included.
     """
     return _compiled(function, forceinline=True, _nrt=False)
+
+
+@dataclass(frozen=True)
+class CacheState:
+    """Where a compiled function is kept, None for nowhere, and whether it is there as its source stands."""
+
+    folder: Path | None
+    compiled: bool
+
+
+def cache_state(function: Callable[..., Any]) -> CacheState:
+    """Return what is kept of a compiled function, without compiling it."""
+    kept = getattr(function, "_cache", None)
+    if not isinstance(kept, _StampedCache):
+        return CacheState(None, compiled=False)
+    try:
+        index = kept._cache_file._load_index()
+    except Exception:  # noqa: BLE001 - what cannot be read is compiled again
+        index = {}
+    current = any(key[-1] == source_stamp(kept._py_func, key[0]) for key in index)
+    return CacheState(Path(kept._cache_path), current)
 
 
 def _compiled(function: Callable[P, R], **options: bool) -> Callable[P, R]:

@@ -42,6 +42,7 @@ ORDER = (
     "reproduce",
     "batch",
     "validation",
+    "doctor",
     "api",
     "cli",
 )

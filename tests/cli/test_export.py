@@ -45,9 +45,10 @@ def test_a_model_in_every_form(ferryid, out: Path, form: str, suffix: str) -> No
     assert told["model"]["sha256"] == hashlib.sha256(source.read_bytes()).hexdigest()
     assert {one["acts_on"] for one in told["effects"]} == {"hull", "thrusters", "sensors"}
     if form in ("gazebo", "px4"):
-        assert "error of the force by the equations of" in ferryid(
-            "export", "milliampere@2", "--to", form, "--out", out
-        ).out
+        assert (
+            "error of the force by the equations of"
+            in ferryid("export", "milliampere@2", "--to", form, "--out", out).out
+        )
         assert told["check"]["missing"]
     # What stays behind is told where results do not go.
     assert "not exported: steady wind of the log trial" in run.err
