@@ -120,9 +120,12 @@ wheel-check: $(VENV)/installed
 	rm -rf build dist $(VENV)/wheel
 	$(BIN)/pip wheel --quiet --no-deps --wheel-dir dist .
 	$(PYTHON) -m venv $(VENV)/wheel
-	$(VENV)/wheel/bin/pip install --quiet --constraint constraints.txt dist/*.whl
-	cd $(VENV)/wheel && bin/ferryid --version && bin/ferryid simulate four-corner --log four.bag --overwrite \
-	  && bin/ferryid fit four.bag --vessel milliampere --out out && bin/ferryid models --out out
+	$(VENV)/wheel/bin/pip install --quiet --constraint constraints.txt pipx uv
+	PIPX_HOME=$(abspath $(VENV)/wheel/pipx) PIPX_BIN_DIR=$(abspath $(VENV)/wheel/apps) PIP_CONSTRAINT=$(abspath constraints.txt) \
+	  $(VENV)/wheel/bin/pipx install --quiet dist/*.whl
+	UV_CONSTRAINT=$(abspath constraints.txt) $(VENV)/wheel/bin/uvx --quiet --from dist/*.whl ferryid --version
+	cd $(VENV)/wheel && apps/ferryid doctor && apps/ferryid simulate four-corner --log four.bag --overwrite \
+	  && apps/ferryid fit four.bag --vessel milliampere --out out && apps/ferryid models --out out
 
 $(VENV)/installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
