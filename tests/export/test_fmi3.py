@@ -89,6 +89,9 @@ def test_a_checker_accepts_it_and_it_moves_as_ferryid_does(name: str, tmp_path: 
     heading = [0.0]
     for state, derivative in zip(states, rate, strict=True):
         heading[0] = state[5]
+        c, s = np.cos(state[5]), np.sin(state[5])
+        u, v, r = state[:3]
+        assert derivative[3:] == pytest.approx([c * u - s * v, s * u + c * v, r], rel=1e-9)
         assert derivative[:3] == pytest.approx(acceleration(state[:3], tau), rel=1e-9, abs=1e-12)
     assert np.gradient(states, 0.1, axis=0)[1:-1] == pytest.approx(rate[1:-1], rel=0.01, abs=0.01)
     exchanged = fmpy.simulate_fmu(
