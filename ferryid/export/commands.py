@@ -11,7 +11,7 @@ from ferryid.errors import FerryIdError
 from ferryid.export.formats import formats
 from ferryid.export.log_file import export_log
 from ferryid.export.model_file import export_model
-from ferryid.export.sdf import shares
+from ferryid.export.sdf import SMALL, shares
 from ferryid.files import check_result
 from ferryid.models.store import load
 from ferryid.types import TimeRanges, no_progress
@@ -110,7 +110,7 @@ def _check_lines(check: Mapping[str, Any] | None) -> list[str]:
         return []
     error = check["error_share"]
     lines = [f"  error of the force by the equations of {check['equations']}: {shares(error['velocity'])}"]
-    if any(error["acceleration"].values()):
+    if any(value > SMALL for value in error["acceleration"].values()):
         lines.append(f"  of the inertia: {shares(error['acceleration'])}")
     return [*lines, *(f"  no term for {part['what']}: {shares(part['share'])}" for part in check["missing"])]
 

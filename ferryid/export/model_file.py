@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,8 @@ SCHEMA = "ferryid.export/1"
 FOLDER = "exports"
 """Folder in the output folder for what is given no name."""
 _HEAD_BYTES = 4096
+MUCH = 0.25
+"""Share of the force from which on an error of another program is a warning."""
 
 
 def export_model(
@@ -62,6 +65,7 @@ def export_model(
     content = text.encode() if isinstance(text, str) else text
     _check_place(place, source, content, overwrite=overwrite or file is None)
     write_bytes(place, content)
+    checked = None if form.check is None else form.check(one, str(text))
     return {
         "schema": SCHEMA,
         "kind": "model",
@@ -77,10 +81,21 @@ def export_model(
         },
         "effects": _effects(one),
         "cases": len(one.cases),
-        "warnings": list(one.warnings()),
+        "warnings": [*one.warnings(), *_errors(checked)],
         "left_out": list(one.left_out()),
-        **({} if form.check is None else {"check": form.check(one, str(text))}),
+        **({} if checked is None else {"check": checked}),
     }
+
+
+def _errors(checked: Mapping[str, Any] | None) -> list[str]:
+    """Return a warning where another program's equations get much of the force wrong."""
+    large = [] if checked is None else [(v, k) for k, v in checked["error_share"]["velocity"].items() if v > MUCH]
+    if checked is None or not large:
+        return []
+    parts = ", ".join(f"{100.0 * value:.0f} % of the {axis} force" for value, axis in sorted(large, reverse=True))
+    return [
+        f"the equations of {checked['equations']} get {parts} wrong: do not simulate manoeuvres with it that depend on it."
+    ]
 
 
 def chosen(to: str) -> Format:

@@ -26,6 +26,8 @@ PART_OF_MASS = 1e-4
 PART_RADIUS_M = 0.1
 DAMPING_RATIO = 0.3
 """Of heave, roll and pitch, assumed."""
+SMALL = 1e-5
+"""Shares of a force that are as good as none."""
 _INERTIA_ROOM = 1.01
 _LENGTH_OF_GYRATION, _LENGTH_OF_BEAM = 4.0, 0.3
 """Length over the radius of gyration, and beam over length, of a hull whose profile does not know them."""
@@ -68,7 +70,7 @@ class Inertial:
     moments: tuple[float, float, float]
 
 
-def inertial(hull: Hull, floating: Box, parts: Sequence[Actuator] = (), inertia_z: float | None = None) -> Inertial:
+def inertial(hull: Hull, floating: Box, parts: Sequence[Actuator] = ()) -> Inertial:
     """Return the hull's link so that it and the links of its thrusters have the mass of the rigid body.
 
     Parameters
@@ -77,8 +79,6 @@ def inertial(hull: Hull, floating: Box, parts: Sequence[Actuator] = (), inertia_
         The hull and its box.
     parts
         Actuators, once for each link that they have.
-    inertia_z
-        Moment about the origin [kg·m²] in place of the hull's.
     """
     part = PART_OF_MASS * hull.mass_kg
     where = [(one.position_m[0], -one.position_m[1]) for one in parts]
@@ -86,9 +86,7 @@ def inertial(hull: Hull, floating: Box, parts: Sequence[Actuator] = (), inertia_
     x = (hull.mass_kg * hull.x_g_m - part * sum(px for px, _ in where)) / mass
     y = -part * sum(py for _, py in where) / mass
     own = 0.4 * part * PART_RADIUS_M**2
-    about_origin = (hull.inertia_z if inertia_z is None else inertia_z) - sum(
-        own + part * (px**2 + py**2) for px, py in where
-    )
+    about_origin = hull.inertia_z - sum(own + part * (px**2 + py**2) for px, py in where)
     izz = about_origin - mass * (x**2 + y**2)
     high = 4.0 * floating.draught_m**2
     ixx, iyy = (mass * (size**2 + high) / 12.0 for size in (floating.beam_m, floating.length_m))
@@ -128,11 +126,11 @@ def inertial_lines(one: Inertial, added: Mapping[str, float] | None = None) -> l
     return [*lines, "</inertial>"]
 
 
-def box_lines(floating: Box) -> list[str]:
-    """Return collision and visual of the hull's box."""
+def box_lines(floating: Box, x_m: float) -> list[str]:
+    """Return collision and visual of the hull's box, at the place of the centre of gravity, so that it floats level."""
     size = " ".join(number(value) for value in (floating.length_m, floating.beam_m, 2.0 * floating.draught_m))
     return [
-        f'<{kind} name="hull"><geometry><box><size>{size}</size></box></geometry></{kind}>'
+        f'<{kind} name="hull"><pose>{number(x_m)} 0 0 0 0 0</pose><geometry><box><size>{size}</size></box></geometry></{kind}>'
         for kind in ("collision", "visual")
     ]
 

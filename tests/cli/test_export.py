@@ -29,8 +29,8 @@ def out(tmp_path: Path) -> Path:
 @pytest.mark.parametrize(
     ("form", "suffix"),
     [
-        *(("c", ".h"), ("fmi3", ".fmu"), ("gazebo", ".sdf"), ("matlab", ".m")),
-        *(("px4", ".sdf"), ("python", ".py"), ("ros2", ".yaml")),
+        *(("c", ".h"), ("fmi3", ".fmu"), ("gazebo", ".gazebo.sdf"), ("matlab", ".m")),
+        *(("px4", ".px4.sdf"), ("python", ".py"), ("ros2", ".yaml")),
     ],
 )
 def test_a_model_in_every_form(ferryid, out: Path, form: str, suffix: str) -> None:

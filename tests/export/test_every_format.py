@@ -34,6 +34,8 @@ FORMATS = sorted(formats())
 def test_a_file_is_a_form() -> None:
     files = [module.name for module in pkgutil.iter_modules(ferryid.export.formats.__path__)]
     assert files == [form.name for form in formats().values()] == FORMATS
+    # No form replaces the file of another.
+    assert len({form.suffix for form in formats().values()}) == len(FORMATS)
 
 
 @pytest.mark.slow

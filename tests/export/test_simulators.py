@@ -91,7 +91,7 @@ def test_gazebo_takes_learned_terms_and_a_factor_on_the_force() -> None:
     assert distance < 1e-6
 
 
-@pytest.mark.parametrize(("form", "most"), [("gazebo", 0.01), ("px4", 0.3)])
+@pytest.mark.parametrize(("form", "most"), [("gazebo", 0.01), ("px4", 0.15)])
 def test_what_a_plugin_has_no_term_for_costs_what_it_states(form: str, most: float) -> None:
     one = exported(MODELS["no basis"], SHA)
     text = formats()[form].render(one)
@@ -130,14 +130,16 @@ def test_px4_floats_with_its_origin_in_the_waterline() -> None:
     segment = radius**2 * np.arccos((radius - depth) / radius) - (radius - depth) * np.sqrt(
         2 * radius * depth - depth**2
     )
-    assert 2.0 * segment * get["boatLength"] * get["waterDensity"] == pytest.approx(1670.0)
+    assert 2.0 * segment * get["boatLength"] * get["waterDensity"] == pytest.approx(
+        2509.1, abs=0.1
+    )  # the mass ahead, with the water
 
 
 def test_a_plugin_that_would_run_away_is_announced() -> None:
     one = plain_hull()
     assert "runs away" not in formats()["px4"].render(one)
     mass = one.force.profile.hull.M.copy()
-    mass[1, 1] = 2.1 * one.force.profile.hull.mass_kg
+    mass[1, 1] = 3.1 * one.force.profile.hull.mass_kg
     assert "yDotV is not below the mass of the link" in formats()["px4"].render(plain_hull(M=mass))
 
 
@@ -170,4 +172,5 @@ def test_every_bundled_vessel_can_be_exported(vessel: str, form: str) -> None:
     assert model is not None
     rigid = simulators.spatial_inertia(model)
     assert np.linalg.eigvalsh(rigid).min() > 0.0
-    assert rigid[1, 5] == pytest.approx(profile.hull.mass_kg * profile.hull.x_g_m, abs=1e-6 * profile.hull.mass_kg)
+    moment = profile.hull.mass_kg * profile.hull.x_g_m if form == "gazebo" else 0.5 * (one.mass[1, 2] + one.mass[2, 1])
+    assert rigid[1, 5] == pytest.approx(moment, abs=1e-6 * profile.hull.mass_kg)

@@ -129,7 +129,7 @@ def _model(one: Exported) -> Iterator[str]:
     yield f'<model name="{one.name}">'
     yield f'  <link name="{LINK}">'
     entries = {key: float(added[at]) for at, key in _PLANE.items() if added[at] != 0.0}
-    for line in (*inertial_lines(moving, entries), *box_lines(floating)):
+    for line in (*inertial_lines(moving, entries), *box_lines(floating, hull.x_g_m)):
         yield f"    {line}"
     yield "  </link>"
     for actuator in actuators:
@@ -289,7 +289,7 @@ def _of_thrusters(one: Exported) -> Iterator[str]:
 
 FORMAT = Format(
     "gazebo",
-    ".sdf",
+    ".gazebo.sdf",
     "an SDF model for Gazebo (gz-sim) with hydrodynamics and thrusters",
     render,
     "use it with: <include><uri>{file}</uri></include> in a world with graded buoyancy",

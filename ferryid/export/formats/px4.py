@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,8 @@ from ferryid.export.sdf import (
 from ferryid.export.simulator_fit import Slots, mass_share, remaining, simulator_fit
 from ferryid.export.words import beside, frames, heading, limits, wrapped
 from ferryid.types import Floats
+from ferryid.vessel.parse_hull import rigid_mass
+from ferryid.vessel.profile import Hull
 from ferryid.vessel.thrusters import FRESH_WATER
 
 _DIAGONAL = np.eye(3, dtype=bool)
@@ -90,20 +93,29 @@ def equations(text: str) -> tuple[Floats, Any]:
     return rigid + np.diag([values[key] for key in _ADDED]), simulated
 
 
+def _link(one: Exported) -> Hull:
+    """Return the link as a hull that has as much of the inertia as a rigid body can.
+
+    That is the lesser of the masses ahead and aside, the moment between sway and yaw, and all of yaw. Only so does the Coriolis
+    force of the added mass act, and the plugin's acceleration of the step before has little to do.
+    """
+    mass = float(min(one.mass[0, 0], one.mass[1, 1]))
+    moment = 0.5 * float(one.mass[1, 2] + one.mass[2, 1])
+    return replace(one.force.profile.hull, mass_kg=mass, x_g_m=moment / mass, inertia_z=float(one.mass[2, 2]))
+
+
 def _rigid(one: Exported) -> Floats:
-    """Return the mass matrix of the link: all inertia in yaw is its own, as that changes nothing else."""
-    hull = one.force.profile.hull
-    moment = hull.mass_kg * hull.x_g_m
-    return np.array([[hull.mass_kg, 0.0, 0.0], [0.0, hull.mass_kg, moment], [0.0, moment, one.mass[2, 2]]])
+    link = _link(one)
+    return rigid_mass(link.mass_kg, link.x_g_m, link.inertia_z)
 
 
 def _model(one: Exported) -> Iterator[str]:
-    hull = one.force.profile.hull
-    floating = box(hull)
-    moving = inertial(hull, floating, inertia_z=float(one.mass[2, 2]))
+    link = _link(one)
+    floating = box(link)
+    moving = inertial(link, floating)
     yield f'<model name="{one.name}">'
     yield f'  <link name="{LINK}">'
-    for line in (*inertial_lines(moving), *box_lines(floating)):
+    for line in (*inertial_lines(moving), *box_lines(floating, link.x_g_m)):
         yield f"    {line}"
     yield "  </link>"
     yield '  <plugin filename="libUsivDynamicsPlugin.so" name="custom::UsvDynamics">'
@@ -121,7 +133,7 @@ def _model(one: Exported) -> Iterator[str]:
 def _parameters(one: Exported) -> dict[str, float]:
     """Return added mass and damping, both positive."""
     terms = simulator_fit(one, SLOTS, coriolis(_rigid(one))).terms
-    mass = one.force.profile.hull.mass_kg
+    mass = _link(one).mass_kg
     added = dict(zip(_ADDED, (float(one.mass[0, 0]) - mass, float(one.mass[1, 1]) - mass, 0.0), strict=True))
     linear = {name: float(terms.linear[axis, axis]) for axis, name in enumerate(_LINEAR)}
     return added | linear | {name: float(terms.absolute[axis, axis, axis]) for axis, name in enumerate(_QUADRATIC)}
@@ -147,8 +159,9 @@ def _how_to_use() -> Iterator[str]:
     told = (
         "For PX4's gz_boat, in place of its link and its plugin. Frames are Gazebo's, x ahead, y to port, z up, with "
         f"{LINK} at the body origin below in the waterline at z = 0; wherever this head names another frame, it is ferryid's.",
-        "Used are xDotU, yDotV, xU, xUU, yV, yVV, nR, nRR. All inertia in yaw is the link's, so nDotR is 0. The plugin "
-        "computes the Coriolis force of the added mass and does not apply it, and knows no current.",
+        "Used are xDotU, yDotV, xU, xUU, yV, yVV, nR, nRR. The plugin computes the Coriolis force of these "
+        "added masses and does not apply it, and knows no current. So the link has as much of the inertia as a rigid body can: "
+        "the lesser of the masses ahead and aside, water included, and all of yaw; its buoyancy carries that mass.",
         "waterLevel is half a radius above the water, as the plugin counts the depth of its hulls from the link's origin.",
         "Motors are PX4's own, and are not exported.",
     )
@@ -173,7 +186,7 @@ def _report(one: Exported, body: str) -> Iterator[str]:
 
 def _unstable(one: Exported) -> Iterator[str]:
     """Yield a warning where the acceleration of the step before makes a simulation run away."""
-    mass = one.force.profile.hull.mass_kg
+    mass = _link(one).mass_kg
     for name, value in _parameters(one).items():
         if name in _ADDED and abs(value) >= mass:
             yield f"{name} is not below the mass of the link: the plugin, a step late with it, runs away"
@@ -181,7 +194,7 @@ def _unstable(one: Exported) -> Iterator[str]:
 
 FORMAT = Format(
     "px4",
-    ".sdf",
+    ".px4.sdf",
     "the link and plugin parameters of a surface vehicle for PX4 in Gazebo",
     render,
     "use it in place of link and UsvDynamics plugin of models/boat/model.sdf",
