@@ -55,7 +55,7 @@ def test_an_end_of_ranges_is_no_version_and_no_form(ferryid, log: Path, monkeypa
     put(log, "to = 60\n")
     monkeypatch.chdir(log.parent)
     assert "--to 60 is no" not in ferryid("models", "rollback", "boat", "--out", log.parent / "out").err
-    assert "give --to c|matlab" in ferryid("export", "boat", "--out", log.parent / "out").err
+    assert "give --to c|fmi3" in ferryid("export", "boat", "--out", log.parent / "out").err
 
 
 def test_a_log_to_write_is_no_log_to_read(ferryid, log: Path, tmp_path: Path) -> None:
