@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from ferryid.cli.completion import effect_names, model_names
 from ferryid.cli.options import OUT, From, Json, Out, To, Verify, Vessel, ranges
 from ferryid.cli.output import emit, progress, tell
 from ferryid.cli.several import several_after
@@ -23,7 +24,10 @@ def command(
     from_: From = None,
     to: To = None,
     model: Annotated[
-        str | None, typer.Option(help="Diagnosed model that brings the hull: path, name or name@version.")
+        str | None,
+        typer.Option(
+            autocompletion=model_names, help="Diagnosed model that brings the hull: path, name or name@version."
+        ),
     ] = None,
     minutes: Annotated[float, typer.Option(help="Longest time of the trial [min].")] = 12.0,
     area: Annotated[
@@ -33,7 +37,8 @@ def command(
     separate: Annotated[
         list[str] | None,
         typer.Option(
-            help="Two effects to separate, as wind,current; repeatable. Those that --after leaves alike are too."
+            autocompletion=effect_names,
+            help="Two effects to separate, as wind,current; repeatable. Those that --after leaves alike are too.",
         ),
     ] = None,
     origin: Annotated[

@@ -8,7 +8,7 @@ PAGE = "docs/errors.md"
 PLACE, OPTION, MEMORY = "a-place-that-cannot-be-written", "an-option-or-argument", "not-enough-memory"
 _LOG, _RANGE, _VESSEL, _WHICH = "a-log", "a-range-of-time", "a-vessel-profile", "which-vessel"
 _FIT, _MODEL, _DIAGNOSIS, _SCENARIO = "a-fit", "a-stored-model", "a-diagnosis", "a-scenario-or-a-simulation"
-_EXPORT, _BATCH, _PROOF = "an-export", "a-batch", "a-proof"
+_EXPORT, _BATCH, _PROOF, _PLAN = "an-export", "a-batch", "a-proof", "a-plan"
 SECTIONS = {
     "batch": _BATCH,
     "cli": OPTION,
@@ -23,6 +23,7 @@ SECTIONS = {
     "identify": _FIT,
     "ingest": _LOG,
     "models": _MODEL,
+    "planning": _PLAN,
     "regression": _FIT,
     "report": _MODEL,
     "reproduce": _PROOF,
