@@ -19,6 +19,7 @@ from ferryid.diagnose.judging.hidden_signal import with_gains
 from ferryid.diagnose.judging.judge import judge
 from ferryid.diagnose.judging.learning import Learner, without_withheld
 from ferryid.diagnose.judging.model_update import store_updated_model
+from ferryid.diagnose.parallel import over
 from ferryid.diagnose.second_sources import compare_second_sources
 from ferryid.effects.wording import listed
 from ferryid.errors import FerryIdError, did_you_mean
@@ -141,8 +142,10 @@ def _diagnosed(
     found = list[Diagnosis]()
     for k, group in enumerate(groups):
         baseline, together = _baseline(group, profile, settings, run)
-        estimated = [estimate(log, baseline) for log in group.logs if log.long_enough]
-        selected = [select(log, run.progress) for log in estimated]
+        selected = over(
+            lambda log, baseline=baseline: select(estimate(log, baseline), run.progress),
+            [log for log in group.logs if log.long_enough],
+        )
         judged = judge(selected, run.progress)
         made = conclude(group.logs, judged, baseline, together, (*group.notes, *_brought(group, together)))
         sources = compare_second_sources([log.screened.measured for log in group.logs], settings.withhold, run.progress)

@@ -79,15 +79,18 @@ def mean_load(measurements: Measurements, air: Floats, gust_std: float) -> Float
     """Return what a wind loads the vessel with on average [N, N, N·m], shape (n, 3).
 
     A load that goes with the square of the speed is larger in gusts: the mean over a normal distribution, by Gauss's and
-    Hermite's rule of three points along north and east each. The last loads are kept: most steps of a fit move other effects.
+    Hermite's rule of three points along north and east each. The loads used last are kept: most steps of a fit move other
+    effects, and fits of one search begin alike.
     """
     key = (*air.tolist(), gust_std)
-    known = measurements.wind_loads.get(key)
+    loads = measurements.wind_loads
+    known = loads.pop(key, None)
     if known is None:
         known = _mean_load(measurements, air, gust_std)
-        if len(measurements.wind_loads) >= KEPT:
-            measurements.wind_loads.clear()
-        measurements.wind_loads[key] = known
+        # A list at once: threads share the loads.
+        for oldest in list(loads)[: 1 - KEPT]:
+            loads.pop(oldest, None)
+    loads[key] = known
     return known
 
 

@@ -117,14 +117,14 @@ NO_DECISION = {
         diagnose.inference.estimation MAX_ITERATIONS HULL_SLOPE_ITERATIONS CONVERGED_GAIN HULL_DIFFERENCE DAMPINGS
         diagnose.inference.estimation PARAMETER_DIFFERENCE LONGEST_STEP
         diagnose.judging.held_out IMITATION_STEPS IMITATION_DIFFERENCE
-        diagnose.inference.kalman CONVERGED
+        diagnose.inference.kalman CONVERGED FEW
         diagnose.inference.noise_estimation START_SHARES DIFFERENCE_STEP FIRST_DAMPING LEAST_DAMPING LARGEST_DAMPING
         diagnose.inference.noise_estimation LONGEST_STEP SUFFICIENT_GAIN
         diagnose.inference.onset_estimation FIRST_TIME_STEP_S LAST_TIME_STEP_S COMPARING_ITERATIONS
         diagnose.inference.profile_likelihood FIRST_STEP STEP_GROWTH LARGEST_FALL MOST_REFINEMENTS QUANTILES
         diagnose.inference.search COARSE_ITERATIONS
         diagnose.inference.stochastic_disturbance START_STRENGTHS START_FREQUENCIES
-        diagnose.judging.findings TIME_STEP TIME_FIT TIME_FINE_S
+        diagnose.judging.findings TIME_STEP TIME_FIT TIME_FINE_S TIMES_AT_ONCE TIME_STRAIGHT
         diagnose.judging.campaign_split WEIGHED
         effects.gusts DIFFERENCE_MPS
         effects.linear_evidence DIFFERENCE_STEP

@@ -18,7 +18,7 @@ from ferryid.diagnose.inference.weak_form import Windows, steps_of
 from ferryid.effects.effect import HELD, Effect, Parameter
 from ferryid.effects.force_model import ForceModel
 from ferryid.effects.wording import titled
-from ferryid.types import Floats
+from ferryid.types import Floats, Ints
 from ferryid.vessel.profile import Profile
 
 MAX_ITERATIONS = 24
@@ -176,6 +176,11 @@ class EstimationProblem:
         return make_whitening_filter(self.filter, self.steps)
 
     @cached_property
+    def origin(self) -> StartingPoint:
+        """The plain force model's hull."""
+        return StartingPoint(self.plain.hull, self.by_hull)
+
+    @cached_property
     def by_hull(self) -> Floats:
         """`hull_slopes` of the plain force model."""
         return self.hull_slopes(self.plain)
@@ -220,6 +225,16 @@ class StartingPoint:
     hull: Floats
     by_hull: Floats
 
+    @cached_property
+    def by_free_hull(self) -> tuple[Ints, Floats, Floats]:
+        """Which coefficients can move, the derivatives by these, shape (w, k), and their cross-products, shape (k, k).
+
+        Many fits begin at one point.
+        """
+        free = np.flatnonzero(self.by_hull.any(axis=0))
+        slopes = self.by_hull[:, free]
+        return free, slopes, slopes.T @ slopes
+
 
 def starting_point(problem: EstimationProblem, made: Fit) -> StartingPoint:
     """Return where to begin a fit that is not far from another."""
@@ -233,6 +248,7 @@ def fit(
     *,
     steps: int = MAX_ITERATIONS,
     begin: StartingPoint | None = None,
+    least: float = -inf,
 ) -> Fit:
     """Fit a hypothesis by Gauss-Newton steps on the posterior.
 
@@ -251,6 +267,9 @@ def fit(
         Most Gauss-Newton steps; with 0 the spread is that at the start.
     begin
         The hull to begin with; the profile's where None.
+    least
+        Evidence below which nobody asks: a fit that would stay below it, however far off its linearisation may be
+        (`INFERENCE.linearisation_factor`), ends where it is.
     """
     every = [parameter for candidate in candidates for parameter in candidate.parameters]
     size = np.array([parameter.size for parameter in every])
@@ -271,6 +290,13 @@ def fit(
     def white(z: Floats) -> Floats:
         return problem.white(force_model_of(z))
 
+    choices = sum(
+        candidate.log_alternatives + len(candidate.times) * log(len(problem.windows.starts)) for candidate in candidates
+    )
+
+    def evidence_of(cost: float, A: Floats) -> float:
+        return -0.5 * (cost + float(np.linalg.slogdet(A)[1])) - problem.whitening_filter.log_scale - choices
+
     z = np.zeros(h + q)
     if every:
         z[h:] = (np.concatenate([one.start for one in candidates] if start is None else start) - neutral) / size
@@ -281,11 +307,10 @@ def fit(
     cost = float(w @ w + z @ z)
     A = np.eye(h + q)
     # What can move: coefficients of the hull, and parameters.
-    moving, free = np.flatnonzero(problem.hull_spread), np.flatnonzero(size > HELD)
-    both = np.concatenate([moving, h + free])
+    free = np.flatnonzero(size > HELD)
     # The hull's derivatives cost most: they are taken anew only now and then, and before the fit ends.
-    by_hull, fresh = (problem.by_hull if begin is None else begin.by_hull)[:, moving], False
-    of_hull = by_hull.T @ by_hull
+    moving, by_hull, of_hull = (problem.origin if begin is None else begin).by_free_hull
+    both, fresh = np.concatenate([moving, h + free]), False
     for count in range(max(steps, 1)):
         if count > 0 and (bends or count % HULL_SLOPE_ITERATIONS == 0):
             by_hull, fresh = problem.hull_slopes(force_model_of(z))[:, moving], True
@@ -302,14 +327,22 @@ def fit(
         A[np.ix_(both, both)] += np.block([[of_hull, across], [across.T, by_effects.T @ by_effects]])
         if count == steps:
             break
-        least = np.concatenate([np.full(h, -np.inf), low - z[h:]])
-        most = np.concatenate([np.full(h, np.inf), high - z[h:]])
+        lowest = np.concatenate([np.full(h, -np.inf), low - z[h:]])
+        highest = np.concatenate([np.full(h, np.inf), high - z[h:]])
         slope, gained = z.copy(), 0.0
         slope[both] += np.concatenate([by_hull.T @ w, by_effects.T @ w])
+        whole = newton_step(A, slope, lowest, highest)
+        if least > -inf:
+            # The score test: what the linearisation promises, and a multiple of it as the most that there may be.
+            promised = -float(2.0 * slope @ whole + whole @ A @ whole)
+            if evidence_of(cost - promised * INFERENCE.linearisation_factor, A) < least:
+                break
         for damping in DAMPINGS:
             # Levenberg's and Marquardt's way, where the whole step leads astray.
-            step = newton_step(A + damping * np.diag(np.diag(A)), slope, least, most)
-            step *= min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), 1e-12))
+            step = whole
+            if damping > 0.0:
+                step = newton_step(A + damping * np.diag(np.diag(A)), slope, lowest, highest)
+            step = step * min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), 1e-12))
             new = z + step
             new[h:] = np.clip(new[h:], low, high)
             w_new = white(new)
@@ -324,13 +357,9 @@ def fit(
             by_hull, fresh = problem.hull_slopes(force_model_of(z))[:, moving], True
             of_hull = by_hull.T @ by_hull
     covariance = np.asarray(np.linalg.inv(A)[h:, h:] * np.outer(size, size), dtype=np.float64)
-    evidence = -0.5 * cost - 0.5 * float(np.linalg.slogdet(A)[1]) - problem.whitening_filter.log_scale
-    evidence -= sum(
-        candidate.log_alternatives + len(candidate.times) * log(len(problem.windows.starts)) for candidate in candidates
-    )
     values = tuple(np.split(neutral + size * z[h:], cuts)) if every else ()
     hull = problem.plain.hull + problem.hull_spread * z[:h]
-    return Fit(tuple(candidates), values, covariance, hull, evidence)
+    return Fit(tuple(candidates), values, covariance, hull, evidence_of(cost, A))
 
 
 def effect_slopes(problem: EstimationProblem, kept: Fit) -> Floats:

@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from ferryid.compiled import compiled
+from ferryid.compiled import borrowing, compiled
 from ferryid.types import Floats
 
 CHANNEL_STATES = 5
 """States of a channel: position, velocity, measurement error, its rate, disturbance."""
 CONVERGED = 1e-9
 """Change of gains, as a share of the largest, below which they stay as they are."""
+FEW = 5
+"""Series up to which `errors` takes them one after the other."""
 DIFFUSE = 2
 """Steps after which position and velocity are known."""
 
@@ -180,7 +182,6 @@ def gains(
     return K, spread
 
 
-@compiled
 def errors(
     K: Floats,
     spread: Floats,
@@ -207,24 +208,122 @@ def errors(
     ndarray
         Shape (n, c, q).
     """
+    if series.shape[2] <= FEW:
+        return _errors_of_few(K, spread, noise, integrals, blocks, columns, step_s, series)
+    return _errors_of_many(K, spread, noise, integrals, blocks, columns, step_s, series)
+
+
+@compiled
+def _errors_of_few(
+    K: Floats,
+    spread: Floats,
+    noise: Floats,
+    integrals: int,
+    blocks: Floats,
+    columns: Floats,
+    step_s: float,
+    series: Floats,
+) -> Floats:
+    """Return `errors` of fewer series than there are states: loops over the states are longer then."""
+    n, c, q = series.shape
+    s = blocks.shape[0]
+    S = CHANNEL_STATES * c + s
+    h, half = step_s, 0.5 * step_s * step_s
+    known = 0 if integrals == 2 else 1
+    keep = kept(noise, step_s)
+    x, scratch = np.empty(S), np.empty(s)
+    out = np.empty((n, c, q))
+    for m in range(q):
+        x[:] = 0.0
+        for k in range(n):
+            for j in range(c):
+                error = series[k, j, m] - x[CHANNEL_STATES * j + known] - x[CHANNEL_STATES * j + 2]
+                out[k, j, m] = error / spread[k, j]
+                for i in range(S):
+                    x[i] += K[k, j, i] * error
+            for j in range(c):
+                # As `advance`.
+                i = CHANNEL_STATES * j
+                place, speed, wrong, rate, push = x[i], x[i + 1], x[i + 2], x[i + 3], x[i + 4]
+                more = speed + h * push
+                for b in range(s):
+                    pushed = columns[k, j, b] * x[CHANNEL_STATES * c + b]
+                    place += half * pushed
+                    more += h * pushed
+                x[i], x[i + 1] = place + (h * speed + half * push), more
+                x[i + 2] = keep[j, 0] * wrong + keep[j, 1] * rate
+                x[i + 3] = keep[j, 2] * wrong + keep[j, 3] * rate
+                x[i + 4] = keep[j, 4] * push
+            for i in range(s):
+                scratch[i] = 0.0
+                for b in range(s):
+                    scratch[i] += blocks[i, b] * x[CHANNEL_STATES * c + b]
+            for i in range(s):
+                x[CHANNEL_STATES * c + i] = scratch[i]
+    return out
+
+
+@compiled
+def _errors_of_many(
+    K: Floats,
+    spread: Floats,
+    noise: Floats,
+    integrals: int,
+    blocks: Floats,
+    columns: Floats,
+    step_s: float,
+    series: Floats,
+) -> Floats:
+    """Return `errors` of many series."""
     n, c, q = series.shape
     s = blocks.shape[0]
     S = CHANNEL_STATES * c + s
     known = 0 if integrals == 2 else 1
     keep = kept(noise, step_s)
     x, error, scratch = np.zeros((S, q)), np.empty(q), np.empty((s, q))
-    out = np.empty((n, c, q))
+    out, begun = np.zeros((n, c, q)), 0
     for k in range(n):
+        begun = begun_by(series, k, begun)
         for j in range(c):
             at, wrong = CHANNEL_STATES * j + known, CHANNEL_STATES * j + 2
-            for m in range(q):
+            for m in range(begun):
                 error[m] = series[k, j, m] - x[at, m] - x[wrong, m]
                 out[k, j, m] = error[m] / spread[k, j]
             for i in range(S):
                 gain = K[k, j, i]
-                for m in range(q):
+                for m in range(begun):
                     x[i, m] += gain * error[m]
         advance(x, keep, blocks, columns, k, step_s, scratch)
+    return out
+
+
+@borrowing
+def begun_by(series: Floats, k: int, begun: int) -> int:
+    """Return how many of the series, shape (n, c, q), have begun by a row: all up to the last that is not zero there.
+
+    One that has not, as of a candidate that acts later, has nothing to predict.
+    """
+    for m in range(series.shape[2] - 1, begun - 1, -1):
+        for j in range(series.shape[1]):
+            if series[k, j, m] != 0.0:
+                return m + 1
+    return begun
+
+
+@compiled
+def summed(gaps: Floats, integrals: int, step_s: float) -> Floats:
+    """Return accelerations, shape (n, c, q), as the velocities that they sum up to, or the positions with two integrals."""
+    n, c, q = gaps.shape
+    out, speed, place = np.empty((n, c, q)), np.zeros((c, q)), np.zeros((c, q))
+    for k in range(n):
+        for j in range(c):
+            for m in range(q):
+                speed[j, m] += gaps[k, j, m]
+                moved = speed[j, m] * step_s
+                if integrals == 2:
+                    place[j, m] += moved
+                    moved = place[j, m] * step_s
+                out[k, j, m] = moved
     return out
 
 
@@ -251,11 +350,16 @@ def errors_alone(K: Floats, spread: Floats, noise: Floats, integrals: int, step_
     a, b, d, e, fade = keep[0, 0], keep[0, 1], keep[0, 2], keep[0, 3], keep[0, 4]
     h, half = step_s, 0.5 * step_s * step_s
     place, speed, wrong, rate, push = np.zeros(q), np.zeros(q), np.zeros(q), np.zeros(q), np.zeros(q)
-    out = np.empty((n, q))
+    out, begun = np.zeros((n, q)), 0
     for k in range(n):
+        # As of `errors`.
+        for m in range(q - 1, begun - 1, -1):
+            if series[k, m] != 0.0:
+                begun = m + 1
+                break
         to_place, to_speed, to_wrong, to_rate, to_push = K[k, 0, 0], K[k, 0, 1], K[k, 0, 2], K[k, 0, 3], K[k, 0, 4]
         scale = spread[k, 0]
-        for m in range(q):
+        for m in range(begun):
             # Read all, then write all: only so is this loop vectorised.
             p, v, w, r, u = place[m], speed[m], wrong[m], rate[m], push[m]
             error = series[k, m] - (p if integrals == 2 else v) - w

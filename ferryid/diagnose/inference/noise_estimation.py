@@ -17,7 +17,7 @@ from ferryid.diagnose.inference.noise_model import (
     make_whitening_filter,
     measured_sizes,
     stride_s,
-    summed,
+    summed_up,
 )
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
@@ -61,7 +61,7 @@ def fit_noise(steps: Windows, gaps: Floats, initial: NoiseModel | None = None) -
     channels = np.empty((gaps.shape[1], 5))
     for group in sorted(set(GROUPS)):
         own = [j for j, g in enumerate(GROUPS) if g == group]
-        series = [summed(gaps[a:b][:, own], steps) for a, b in steps.runs]
+        series = [summed_up(gaps[a:b][:, own], steps) for a, b in steps.runs]
         size = scale[own].mean(keepdims=True)
 
         def predictions(z: Floats, series: list[Floats] = series, size: Floats = size) -> Predictions:

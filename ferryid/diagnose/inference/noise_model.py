@@ -14,7 +14,7 @@ from math import cos, exp, pi, sin
 
 import numpy as np
 
-from ferryid.diagnose.inference.kalman import DIFFUSE, errors, errors_alone, gains
+from ferryid.diagnose.inference.kalman import DIFFUSE, errors, errors_alone, gains, summed
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.effects.effect import Process
 from ferryid.effects.force_model import ForceModel
@@ -68,7 +68,7 @@ class WhiteningFilter:
         for part in self.parts:
             own = list(part.channels)
             for (first, end), (K, spread) in zip(self.steps.runs, part.gains, strict=True):
-                series = summed(gaps[first:end][:, own].reshape(end - first, len(own), -1), self.steps)
+                series = summed_up(gaps[first:end][:, own].reshape(end - first, len(own), -1), self.steps)
                 if not part.blocks.size:
                     errors_ = errors_alone(K, spread, part.noise, integrals, h, series[:, 0])[:, None]
                 else:
@@ -147,11 +147,10 @@ def stride_s(steps: Windows) -> float:
     return (len(steps.weight) - 1) // integrals_of(steps) * steps.measurements.step_s
 
 
-def summed(gaps: Floats, steps: Windows) -> Floats:
-    """Return the gaps of one series, shape (J, ...), as what they sum up to in position or velocity."""
-    h = stride_s(steps)
-    total = np.cumsum(gaps, axis=0) * h
-    return np.ascontiguousarray(np.cumsum(total, axis=0) * h if integrals_of(steps) == 2 else total)
+def summed_up(gaps: Floats, steps: Windows) -> Floats:
+    """Return the gaps of one series, shape (J, c) or (J, c, q), as what they sum up to in position or velocity."""
+    flat = np.ascontiguousarray(gaps).reshape(*gaps.shape[:2], -1)
+    return summed(flat, integrals_of(steps), stride_s(steps)).reshape(gaps.shape)
 
 
 def measured_sizes(steps: Windows) -> Floats:

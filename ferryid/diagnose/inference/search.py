@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from math import exp
+from math import exp, inf
 
 import numpy as np
 
@@ -120,6 +120,7 @@ def search(
         candidates = list(known)
     steady = [candidate for candidate in candidates if candidate.effect.unsteady is None]
     disturbances = [candidate for candidate in candidates if candidate.effect.unsteady is not None]
+    about = frozenset(candidate.effect.about for candidate in disturbances)
     undisturbed = problem.plain
     chosen, rounds = fit(problem, ()), list[Round]()
     states: tuple[DisturbanceState, ...] = ()
@@ -129,7 +130,7 @@ def search(
         taken = {candidate.key for candidate in chosen.candidates}
         left = [candidate for candidate in steady if candidate.key not in taken]
         progress(f"weighing {len(left)} hypotheses beside {len(taken) or 'none'} found")
-        found = _ranked_candidates(problem, chosen, left)
+        found = _ranked_candidates(problem, chosen, left, about)
         rounds.append(_round(found))
         good = [one for one in found if one.gain > INFERENCE.prior_odds and not is_negligible(problem, one.fit)]
         best = good[0] if good and len(taken) < INFERENCE.most_effects else None
@@ -189,13 +190,16 @@ def _fit_beside_disturbances(
 
 
 def _ranked_candidates(
-    problem: EstimationProblem, chosen: Fit, candidates: Sequence[Candidate]
+    problem: EstimationProblem, chosen: Fit, candidates: Sequence[Candidate], about: Collection[str]
 ) -> list[ScoredCandidate]:
-    """Return what each candidate adds to those chosen already, the best first."""
+    """Return what each candidate adds to those chosen already, the best first.
+
+    What disturbances are looked for beside, `about`, is fitted however little it promises.
+    """
     current = fit(problem, chosen.candidates, chosen.values)
     begin = starting_point(problem, current)
     linearisation = linearise(problem, current, begin)
-    tried = over(partial(_best_fit, problem, current, begin, linearisation), candidates)
+    tried = over(partial(_best_fit, problem, current, begin, linearisation, about), candidates)
     found = [one for one in tried if one is not None]
     found.sort(key=lambda one: -one.gain)
     fair = over(partial(_with_own_noise, problem), found[: INFERENCE.compared_candidates])
@@ -208,7 +212,12 @@ def _with_own_noise(problem: EstimationProblem, one: ScoredCandidate) -> ScoredC
 
 
 def _best_fit(
-    problem: EstimationProblem, current: Fit, begin: StartingPoint, linearisation: Linearisation, candidate: Candidate
+    problem: EstimationProblem,
+    current: Fit,
+    begin: StartingPoint,
+    linearisation: Linearisation,
+    about: Collection[str],
+    candidate: Candidate,
 ) -> ScoredCandidate | None:
     """Return a candidate's best fit beside the current ones, over all spans where it can begin or end; None if nowhere."""
 
@@ -216,7 +225,9 @@ def _best_fit(
         gain = made.evidence - current.evidence
         return ScoredCandidate(made.candidates[-1], made, gain)
 
-    def scored_fit(one: Candidate, values: Floats | None = None) -> ScoredCandidate:
+    hopeless = INFERENCE.hopeless_share * INFERENCE.prior_odds
+
+    def scored_fit(one: Candidate, values: Floats | None = None, least: float = hopeless) -> ScoredCandidate:
         start = (*current.values, one.start if values is None else values)
         # Where the hull has strained to stand in for an effect that multiplies it, the way to both leads from the profile's.
         from_prior = one.effect.changes_hull and not one.times
@@ -226,6 +237,8 @@ def _best_fit(
             start,
             steps=COARSE_ITERATIONS if from_prior or one.effect.piecewise else COMPARING_ITERATIONS,
             begin=None if from_prior else begin,
+            # The slope at the start leads a part of the way only, or from far away.
+            least=-inf if from_prior or one.effect.piecewise or one.effect.id in about else current.evidence + least,
         )
         return scored(made)
 
@@ -235,7 +248,9 @@ def _best_fit(
         return throughout[0]
     # The impulse of an onset shows within seconds of it only; what is changed from then on leads there.
     smooth = replace(candidate, effect=replace(candidate.effect, impulse=None))
-    spans = [scored_fit(one) for one in promising_spans(problem, linearisation, smooth)]
+    # Seconds matter: which of them is best shows when each has its own.
+    least = max([hopeless, *(one.gain for one in throughout)])
+    spans = [scored_fit(one, least=least) for one in promising_spans(problem, linearisation, smooth)]
     index, step = len(current.candidates), 0.5 * part_s(problem, candidate)
 
     def refined(one: ScoredCandidate) -> ScoredCandidate:
@@ -243,8 +258,6 @@ def _best_fit(
         with_impulse = scored_fit(replace(coarse.candidates[-1], effect=candidate.effect), coarse.values[-1])
         return scored(refine_span(problem, with_impulse.fit, index, begin, min(step, FIRST_TIME_STEP_S)))
 
-    # Seconds matter: which of them is best shows when each has its own.
-    least = max([0.5 * INFERENCE.prior_odds, *(one.gain for one in throughout)])
     return max(
         [*throughout, *(refined(one) for one in spans if one.gain > least)], key=lambda one: one.gain, default=None
     )

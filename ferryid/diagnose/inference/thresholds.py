@@ -38,6 +38,18 @@ class InferenceThresholds:
         "log evidence above which an effect is selected before gusts and waves are searched for",
         "convention: gusts and waves look like nothing so clear",
     )
+    linearisation_factor: float = threshold(
+        4.0,
+        "times the gain that a linearisation promises",
+        "most that a fit may gain; one that would stay hopeless even so is given up",
+        "convention: an effect that acts twice as strongly as its slope says gains four times as much",
+    )
+    hopeless_share: float = threshold(
+        0.5,
+        "of the prior odds",
+        "log evidence that a candidate must be able to gain, or its fit is given up",
+        "convention: half, as the noise that a candidate leaves raises its evidence somewhat",
+    )
     compared_candidates: int = threshold(
         5,
         "candidates",

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from itertools import pairwise
 from math import inf
 from typing import Any
 
@@ -31,6 +32,7 @@ from ferryid.diagnose.judging.finding import Finding, Rival
 from ferryid.diagnose.judging.held_out import Proof
 from ferryid.diagnose.judging.locate import locate
 from ferryid.diagnose.judging.thresholds import JUDGING
+from ferryid.diagnose.parallel import over
 from ferryid.effects.force_model import Measurements
 from ferryid.types import AXES, Floats
 
@@ -38,6 +40,10 @@ TIME_STEP, TIME_FIT = 0.125, 3
 """Step between times that are weighed, in lengths of a window, and steps of the fit for each."""
 TIME_FINE_S = 0.2
 """Fine step between times that are compared [s]: that of the forces."""
+TIMES_AT_ONCE = 4
+"""Steps to either side that are weighed before it is seen whether to go on."""
+TIME_STRAIGHT = 0.1
+"""How far the log evidence of a time may be off the line between its neighbours before times between them are weighed [nat]."""
 SHOWN_RIVALS = 3
 
 
@@ -212,7 +218,7 @@ def _time(problem: EstimationProblem, kept: Fit, index: int, end: str) -> Estima
         ``onset_s`` or ``offset_s``.
     """
     candidate = kept.candidates[index]
-    times = problem.windows.middle_s
+    middles = problem.windows.middle_s
     step = TIME_STEP * len(problem.windows.weight) * problem.windows.measurements.step_s
 
     begin = starting_point(problem, kept)
@@ -222,25 +228,37 @@ def _time(problem: EstimationProblem, kept: Fit, index: int, end: str) -> Estima
         return fit(problem, moved, kept.values, steps=TIME_FIT, begin=begin).evidence
 
     # It ends after it began.
-    first = max(candidate.onset_s, float(times[0])) if end == "offset_s" else float(times[0])
-    last = min(candidate.offset_s, float(times[-1])) if end == "onset_s" else float(times[-1])
+    first = max(candidate.onset_s, float(middles[0])) if end == "offset_s" else float(middles[0])
+    last = min(candidate.offset_s, float(middles[-1])) if end == "onset_s" else float(middles[-1])
     here = getattr(candidate, end)
     tried = {here: evidence_at(here)}
-    for side in (-1.0, 1.0):
-        time = here + side * step
-        while first < time < last:
-            tried[time] = evidence_at(time)
-            if tried[time] < max(tried.values()) - JUDGING.time_drop:
-                break
-            time += side * step
-    # About the likeliest it changes within a step.
-    top = max(tried.values())
-    for time in [time for time, evidence in tried.items() if evidence > top - JUDGING.fine_time_drop]:
-        for near_by in (
-            time + TIME_FINE_S * np.arange(-round(step / TIME_FINE_S), round(step / TIME_FINE_S) + 1)
-        ).tolist():
-            if first < near_by < last and min(abs(near_by - other) for other in tried) > 0.5 * TIME_FINE_S:
-                tried[near_by] = evidence_at(near_by)
+
+    def explore(moments: Iterable[float]) -> None:
+        new = [
+            one
+            for one in moments
+            if first < one < last and min(abs(one - known) for known in tried) > 0.5 * TIME_FINE_S
+        ]
+        tried.update(zip(new, over(evidence_at, new), strict=True))
+
+    # Several at once, for threads.
+    ends, counts = {-1.0: here, 1.0: here}, np.arange(1, TIMES_AT_ONCE + 1)
+    while ends:
+        new = {side: (end + side * step * counts).tolist() for side, end in ends.items()}
+        explore([time for times in new.values() for time in times])
+        lowest = max(tried.values()) - JUDGING.time_drop
+        ends = {side: times[-1] for side, times in new.items() if min(tried.get(one, -inf) for one in times) >= lowest}
+    # About the likeliest it changes within a step; elsewhere only where it does not lie on a line between its neighbours.
+    fine = round(step / TIME_FINE_S)
+    likeliest = max(tried, key=tried.__getitem__)
+    explore((likeliest + TIME_FINE_S * np.arange(-fine, fine + 1)).tolist())
+    lowest = max(tried.values()) - JUDGING.fine_time_drop
+    gaps = [pair for pair in pairwise(sorted(tried)) if max(tried[one] for one in pair) > lowest]
+    while gaps := [(a, b) for a, b in gaps if b - a > 1.5 * TIME_FINE_S]:
+        explore([0.5 * (a + b) for a, b in gaps])
+        halved = [(a, 0.5 * (a + b), b) for a, b in gaps]
+        bent = [one for one in halved if abs(tried[one[1]] - 0.5 * (tried[one[0]] + tried[one[2]])) > TIME_STRAIGHT]
+        gaps = [pair for one in bent for pair in pairwise(one)]
     moments = np.array(sorted(tried))
     # Each moment stands for the time about it; the posterior is as much wider as that of other parameters.
     edges = np.concatenate([moments[:1], 0.5 * (moments[1:] + moments[:-1]), moments[-1:]])

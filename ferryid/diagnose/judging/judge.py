@@ -18,6 +18,7 @@ from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.findings import force_claims
 from ferryid.diagnose.judging.signal_to_noise import velocity_noise_shares
 from ferryid.diagnose.judging.unexplained import Unexplained, find_unexplained
+from ferryid.diagnose.parallel import over
 from ferryid.effects import effects
 from ferryid.types import AXES
 from ferryid.vessel.profile import Profile
@@ -53,14 +54,16 @@ class JudgedLog:
 
 def judge(logs: Sequence[SelectedLog], progress: Callable[[str], None]) -> tuple[JudgedLog, ...]:
     """Judge the selections of the logs of a campaign: one by one, and by laws that hold in all of them."""
-    stand = [eliminate_backward(log.search.problem, log.search.fit, log.steady, progress) for log in logs]
+    stand = over(lambda log: eliminate_backward(log.search.problem, log.search.fit, log.steady, progress), logs)
     laws: Mapping[str, CampaignLaws] = {}
     if any(log.estimated.baseline.joint for log in logs):
         progress("looking for laws that hold in all logs")
         laws = find_campaign_laws(
             {log.path: (log.search.problem, one.fit) for log, one in zip(logs, stand, strict=True)}
         )
-    return tuple(_judged(log, one, laws.get(log.path), progress) for log, one in zip(logs, stand, strict=True))
+    return tuple(
+        over(lambda one: _judged(one[0], one[1], laws.get(one[0].path), progress), zip(logs, stand, strict=True))
+    )
 
 
 def _judged(
