@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path, PurePath
 
 from ferryid.diagnose.gathering import Gathered, Group, gather, part, without_logs
 from ferryid.diagnose.inference.baselines import CampaignBaseline, HullBaseline, SimulationBaseline
 from ferryid.diagnose.inference.campaign import assemble
 from ferryid.diagnose.inference.simulation_baseline import learn_simulation
-from ferryid.diagnose.inference.stages import Baseline, estimate, select
+from ferryid.diagnose.inference.stages import AveragedLog, Baseline, SelectedLog, estimate, select
 from ferryid.diagnose.judging.campaign import JudgedCampaign, judge_campaign
 from ferryid.diagnose.judging.conclude import conclude
 from ferryid.diagnose.judging.diagnosis import Diagnosis, distinguished
@@ -142,10 +143,7 @@ def _diagnosed(
     found = list[Diagnosis]()
     for k, group in enumerate(groups):
         baseline, together = _baseline(group, profile, settings, run)
-        selected = over(
-            lambda log, baseline=baseline: select(estimate(log, baseline), run.progress),
-            [log for log in group.logs if log.long_enough],
-        )
+        selected = over(partial(_selected, baseline, run), [log for log in group.logs if log.long_enough])
         judged = judge(selected, run.progress)
         made = conclude(group.logs, judged, baseline, together, (*group.notes, *_brought(group, together)))
         sources = compare_second_sources([log.screened.measured for log in group.logs], settings.withhold, run.progress)
@@ -157,6 +155,10 @@ def _diagnosed(
             for one in made
         ]
     return tuple(found)
+
+
+def _selected(baseline: Baseline, run: RunContext, log: AveragedLog) -> SelectedLog:
+    return select(estimate(log, baseline), run.progress)
 
 
 def _brought(group: Group, together: JudgedCampaign | None) -> tuple[str, ...]:

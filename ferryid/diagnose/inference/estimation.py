@@ -5,21 +5,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import inf, isfinite, log
+from math import inf, log
 
 import numpy as np
 
 from ferryid.diagnose.inference.autoregression import AutoregressiveNoise, fit_autoregression
+from ferryid.diagnose.inference.candidate import Candidate as Candidate
+from ferryid.diagnose.inference.candidate import acting_order
+from ferryid.diagnose.inference.candidate import apply_candidates as apply_candidates
 from ferryid.diagnose.inference.newton_step import newton_step
 from ferryid.diagnose.inference.noise_estimation import excerpt, fit_noise
 from ferryid.diagnose.inference.noise_model import NoiseModel, WhiteningFilter, make_whitening_filter
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows, steps_of
-from ferryid.effects.effect import HELD, Effect, Parameter
+from ferryid.effects.effect import HELD
 from ferryid.effects.force_model import ForceModel
-from ferryid.effects.wording import titled
 from ferryid.types import Floats, Ints
-from ferryid.vessel.profile import Profile
 
 MAX_ITERATIONS = 24
 HULL_SLOPE_ITERATIONS = 4
@@ -33,56 +34,6 @@ PARAMETER_DIFFERENCE = 1e-2
 """Finite difference of an effect's parameter, in its size."""
 LONGEST_STEP = 4.0
 """Longest Gauss-Newton step, in sizes of a parameter."""
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """An effect in one instance; `log_alternatives` as in `ferryid.effects.effect.Choice`, with `Effect.log_rarity`.
-
-    It acts from `onset_s` (0: from the start of the log) until `offset_s` (infinite: to its end), in a campaign in the logs of
-    one group, or of all where `group` is empty.
-    """
-
-    effect: Effect
-    instance: str | None
-    parameters: tuple[Parameter, ...]
-    onset_s: float = 0.0
-    offset_s: float = inf
-    log_alternatives: float = 0.0
-    group: str = ""
-
-    @classmethod
-    def of(cls, effect: Effect, instance: str | None, profile: Profile) -> Candidate:
-        """Return an effect with the parameters and the prior odds that it has on a vessel."""
-        return cls(effect, instance, effect.parameters_of(profile), log_alternatives=effect.log_rarity(profile))
-
-    @property
-    def times(self) -> tuple[str, ...]:
-        """Which of the two ends of its span lie within the log."""
-        return (*(("onset_s",) if self.onset_s > 0.0 else ()), *(("offset_s",) if isfinite(self.offset_s) else ()))
-
-    def moved(self, end: str, time_s: float) -> Candidate:
-        """Return the candidate with one of its `times` elsewhere."""
-        return replace(self, onset_s=time_s) if end == "onset_s" else replace(self, offset_s=time_s)
-
-    @property
-    def key(self) -> tuple[str, str | None]:
-        """Effect and instance."""
-        return self.effect.id, self.instance
-
-    @property
-    def title(self) -> str:
-        """The effect's title, with the thruster that it is one of."""
-        return titled(self.effect.title, self.instance)
-
-    @property
-    def start(self) -> Floats:
-        """Parameters with which a search begins."""
-        return np.array([one.neutral if one.start is None else one.start for one in self.parameters])
-
-    def act(self, force_model: ForceModel, p: Floats) -> ForceModel:
-        """Return the force model with the effect in it."""
-        return self.effect.act(force_model, p, self.instance, self.onset_s, self.offset_s)
 
 
 @dataclass(frozen=True)
@@ -281,14 +232,20 @@ def fit(
     # Where an effect changes masses or damping itself, what the hull's coefficients do depends on it.
     bends = any(candidate.effect.changes_hull for candidate in candidates)
 
-    def force_model_of(z: Floats) -> ForceModel:
-        force_model = replace(problem.plain, hull=problem.plain.hull + problem.hull_spread * z[:h])
-        return (
-            apply_candidates(force_model, candidates, np.split(neutral + size * z[h:], cuts)) if every else force_model
-        )
+    order = acting_order(candidates)
 
-    def white(z: Floats) -> Floats:
-        return problem.white(force_model_of(z))
+    def chain_of(z: Floats) -> list[ForceModel]:
+        """Return the force model of the hull alone, and with each further candidate in the order in which they act."""
+        return extended([replace(problem.plain, hull=problem.plain.hull + problem.hull_spread * z[:h])], z)
+
+    def extended(chain: list[ForceModel], z: Floats) -> list[ForceModel]:
+        values = np.split(neutral + size * z[h:], cuts) if every else []
+        for i in order[len(chain) - 1 :]:
+            chain.append(candidates[i].act(chain[-1], values[i]))
+        return chain
+
+    def white(chain: Sequence[ForceModel]) -> Floats:
+        return problem.white(chain[-1])
 
     choices = sum(
         candidate.log_alternatives + len(candidate.times) * log(len(problem.windows.starts)) for candidate in candidates
@@ -303,24 +260,29 @@ def fit(
     if begin is not None:
         moves = problem.hull_spread > 0.0
         z[:h][moves] = (begin.hull - problem.plain.hull)[moves] / problem.hull_spread[moves]
-    w = white(z)
+    chain = chain_of(z)
+    w = white(chain)
     cost = float(w @ w + z @ z)
     A = np.eye(h + q)
     # What can move: coefficients of the hull, and parameters.
     free = np.flatnonzero(size > HELD)
+    # As how manyeth the candidate of every parameter acts.
+    acts = [order.index(i) for i, candidate in enumerate(candidates) for _ in candidate.parameters]
     # The hull's derivatives cost most: they are taken anew only now and then, and before the fit ends.
     moving, by_hull, of_hull = (problem.origin if begin is None else begin).by_free_hull
     both, fresh = np.concatenate([moving, h + free]), False
     for count in range(max(steps, 1)):
         if count > 0 and (bends or count % HULL_SLOPE_ITERATIONS == 0):
-            by_hull, fresh = problem.hull_slopes(force_model_of(z))[:, moving], True
+            by_hull, fresh = problem.hull_slopes(chain[-1])[:, moving], True
             of_hull = by_hull.T @ by_hull
         by_effects = np.empty((len(w), 0))
         if free.size:
             d = np.where(z[h + free] + PARAMETER_DIFFERENCE <= high[free], PARAMETER_DIFFERENCE, -PARAMETER_DIFFERENCE)
             moved = np.repeat(z[None], len(free), axis=0)
             moved[np.arange(len(free)), h + free] += d
-            gaps = np.stack([problem.steps.gap(force_model_of(one)) for one in moved], axis=2)
+            # What acts before a candidate is as it was.
+            there = [extended(chain[: 1 + acts[k]], one)[-1] for k, one in zip(free.tolist(), moved, strict=True)]
+            gaps = np.stack([problem.steps.gap(one) for one in there], axis=2)
             by_effects = (problem.whitening_filter.white(gaps) - w[:, None]) / d
         across = by_hull.T @ by_effects
         A = np.eye(h + q)
@@ -345,16 +307,17 @@ def fit(
             step = step * min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), 1e-12))
             new = z + step
             new[h:] = np.clip(new[h:], low, high)
-            w_new = white(new)
+            chain_new = chain_of(new)
+            w_new = white(chain_new)
             new_cost = float(w_new @ w_new + new @ new)
             if new_cost < cost:
                 gained = cost - new_cost
-                z, w, cost = new, w_new, new_cost
+                z, w, cost, chain = new, w_new, new_cost, chain_new
                 break
         if gained < CONVERGED_GAIN:
             if fresh or steps <= HULL_SLOPE_ITERATIONS:
                 break
-            by_hull, fresh = problem.hull_slopes(force_model_of(z))[:, moving], True
+            by_hull, fresh = problem.hull_slopes(chain[-1])[:, moving], True
             of_hull = by_hull.T @ by_hull
     covariance = np.asarray(np.linalg.inv(A)[h:, h:] * np.outer(size, size), dtype=np.float64)
     values = tuple(np.split(neutral + size * z[h:], cuts)) if every else ()
@@ -400,13 +363,6 @@ def choose_parameters(problem: EstimationProblem, beside: Fit, candidate: Candid
 def fitted_force_model(plain: ForceModel, made: Fit) -> ForceModel:
     """Return the force model that a fit has of the log."""
     return apply_candidates(replace(plain, hull=made.hull), made.candidates, made.values)
-
-
-def apply_candidates(force_model: ForceModel, candidates: Sequence[Candidate], values: Sequence[Floats]) -> ForceModel:
-    """Return the force model with some candidates in it, each in its turn."""
-    for candidate, p in sorted(zip(candidates, values, strict=True), key=lambda one: one[0].effect.order):
-        force_model = candidate.act(force_model, p)
-    return force_model
 
 
 def estimation_problem(windows: Windows, plain: ForceModel, hull_spread: Floats) -> EstimationProblem:

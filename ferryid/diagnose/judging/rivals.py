@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import exp
+from math import exp, inf
 
 from ferryid.diagnose.inference.estimation import (
     Candidate,
@@ -83,6 +83,8 @@ def compare_rivals(problem: EstimationProblem, kept: Fit, index: int, library: S
             start,
             steps=COARSE_ITERATIONS,
             begin=None if stand_in.effect.changes_hull else begin,
+            # One that is worse than nothing is no rival, whatever it comes to.
+            least=-inf if stand_in.effect.changes_hull or stand_in.effect.piecewise else bare.evidence,
         )
         return RivalFit(stand_in, made, made.evidence - kept.evidence)
 

@@ -15,7 +15,7 @@ from ferryid.diagnose.inference.kalman import DIFFUSE
 from ferryid.diagnose.inference.noise_model import NoiseModel, stride_s
 from ferryid.diagnose.inference.weak_form import steps_of, windows
 from ferryid.effects import effects
-from ferryid.effects.effect import Effect, Parameter
+from ferryid.effects.effect import HELD, Effect, Parameter
 from ferryid.effects.force_model import ForceModel, Measurements, hull_of
 from ferryid.types import Floats
 from ferryid.vessel import load_profile
@@ -103,6 +103,51 @@ def test_a_linear_hypothesis_has_the_mean_spread_and_evidence_of_the_formula() -
     known = shared.logpdf(y) - alone.logpdf(y)
     assert known > 3.0
     np.testing.assert_allclose(found.evidence - nothing.evidence, known, rtol=1e-3, atol=1e-2)
+
+
+def test_a_fit_is_given_up_only_where_it_cannot_reach_what_is_asked() -> None:
+    case, calls = problem(60.0), list[float]()
+
+    def counted(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+        calls.append(float(p[0]))
+        return push(force_model, p, instance)
+
+    candidate = replace(PUSH, effect=replace(PUSH.effect, apply=counted))
+    whole = fit(case, [candidate])
+    start = fit(case, [candidate], steps=0)
+    # It is linear: what the slope promises is all that there is, which four times as much is the bound of.
+    gain = whole.evidence - start.evidence
+    assert gain > 3.0
+    for beyond, given_up in ((gain, False), (3.9 * gain, False), (4.1 * gain, True)):
+        calls.clear()
+        made = fit(case, [candidate], least=start.evidence + beyond)
+        expected = start if given_up else whole
+        # Where it starts and its slope there.
+        assert (len(calls) == 2) == given_up
+        np.testing.assert_allclose([made.evidence, made.values[0][0]], [expected.evidence, expected.values[0][0]])
+
+
+@pytest.mark.parametrize("moved", [0, 1])
+def test_slopes_are_those_of_all_effects_where_one_acts_on_what_another_leaves(moved: int) -> None:
+    def stronger(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+        return replace(force_model, external=force_model.external * (1.0 + p[0]))
+
+    factor = Candidate(
+        replace(PUSH.effect, id="factor", apply=stronger), None, (Parameter("factor", "-", 0.5, -1e4, 1e4),)
+    )
+    case = problem(60.0)
+    values = [np.array([40.0]), np.array([0.3])]
+    held = [
+        replace(one, parameters=tuple(replace(each, size=HELD, neutral=float(v[0])) for each in one.parameters))
+        if k != moved
+        else one
+        for k, (one, v) in enumerate(zip([PUSH, factor], values, strict=True))
+    ]
+    both = fit(case, held, values)
+    # Force times factor is all that matters.
+    product = both.values[0][0] * (1.0 + both.values[1][0])
+    alone = fit(case, [PUSH]).values[0][0]
+    np.testing.assert_allclose(product, alone, rtol=0.05)
 
 
 @pytest.mark.slow

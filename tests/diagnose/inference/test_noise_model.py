@@ -12,7 +12,7 @@ from scipy.stats import chi2, multivariate_normal
 
 from ferryid.diagnose.inference.autoregression import ORDER, AutoregressiveNoise
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, fit
-from ferryid.diagnose.inference.kalman import DIFFUSE, errors, errors_alone, gains, predictions_alone
+from ferryid.diagnose.inference.kalman import DIFFUSE, FEW, errors, errors_alone, gains, predictions_alone, summed
 from ferryid.diagnose.inference.noise_estimation import _widths, excerpt, fit_noise
 from ferryid.diagnose.inference.noise_model import NoiseModel, likelihood, make_whitening_filter, stride_s
 from ferryid.diagnose.inference.thresholds import INFERENCE
@@ -116,6 +116,35 @@ def test_one_channel_alone_has_the_innovations_of_its_dense_covariance(row: Floa
     D = contrasts(1, n, integrals)
     new = np.linalg.solve(np.linalg.cholesky(D @ (error + G @ push @ G.T) @ D.T), D @ series)
     np.testing.assert_allclose(left[DIFFUSE:], new[DIFFUSE - integrals :], atol=1e-4)
+
+
+@pytest.mark.parametrize("integrals", [2, 1], ids=["positions", "velocities"])
+def test_series_are_filtered_alike_in_any_number_and_from_where_they_begin(integrals: int) -> None:
+    n, h, rng = 60, 0.4, np.random.default_rng(3)
+    series = 0.02 * np.cumsum(rng.standard_normal((n, 3, 2 * FEW)), axis=0)
+    for m in range(2 * FEW):
+        series[: 4 * m, :, m] = 0.0
+    blocks, columns = 0.9 * np.eye(2), 0.01 * rng.standard_normal((n, 3, 2))
+    drive = np.stack([0.2 * np.eye(2), np.eye(2)])
+    K, spread = gains(np.ones(3), TRUE[[0, 0, 2]], integrals, blocks, drive, columns, h)
+    given = (K, spread, TRUE[[0, 0, 2]], integrals, blocks, columns, h)
+    together = errors(*given, series)
+    assert not together[:4, :, 1].any()
+    assert together[4:, :, 1].all()
+    for m in range(2 * FEW):
+        np.testing.assert_allclose(
+            together[:, :, m], errors(*given, series[:, :, m : m + 1].copy())[:, :, 0], rtol=1e-12
+        )
+        # Its first value, of the channel that is looked at first, is all that it is off.
+        np.testing.assert_allclose(together[4 * m, 0, m] * spread[4 * m, 0], series[4 * m, 0, m], rtol=1e-12)
+
+
+@pytest.mark.parametrize("integrals", [2, 1], ids=["positions", "velocities"])
+def test_accelerations_sum_up_to_velocities_and_positions(integrals: int) -> None:
+    gaps, h = np.random.default_rng(4).standard_normal((30, 2, 3)), 0.4
+    velocity = np.cumsum(gaps, axis=0) * h
+    expected = np.cumsum(velocity, axis=0) * h if integrals == 2 else velocity
+    np.testing.assert_allclose(summed(gaps, integrals, h), expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize("integrals", [2, 1], ids=["positions", "velocities"])

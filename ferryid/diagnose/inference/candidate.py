@@ -1,0 +1,77 @@
+"""An effect that may act in a log, with its parameters and the time in which it acts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import inf, isfinite
+
+import numpy as np
+
+from ferryid.effects.effect import Effect, Parameter
+from ferryid.effects.force_model import ForceModel
+from ferryid.effects.wording import titled
+from ferryid.types import Floats
+from ferryid.vessel.profile import Profile
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect in one instance; `log_alternatives` as in `ferryid.effects.effect.Choice`, with `Effect.log_rarity`.
+
+    It acts from `onset_s` (0: from the start of the log) until `offset_s` (infinite: to its end), in a campaign in the logs of
+    one group, or of all where `group` is empty.
+    """
+
+    effect: Effect
+    instance: str | None
+    parameters: tuple[Parameter, ...]
+    onset_s: float = 0.0
+    offset_s: float = inf
+    log_alternatives: float = 0.0
+    group: str = ""
+
+    @classmethod
+    def of(cls, effect: Effect, instance: str | None, profile: Profile) -> Candidate:
+        """Return an effect with the parameters and the prior odds that it has on a vessel."""
+        return cls(effect, instance, effect.parameters_of(profile), log_alternatives=effect.log_rarity(profile))
+
+    @property
+    def times(self) -> tuple[str, ...]:
+        """Which of the two ends of its span lie within the log."""
+        return (*(("onset_s",) if self.onset_s > 0.0 else ()), *(("offset_s",) if isfinite(self.offset_s) else ()))
+
+    def moved(self, end: str, time_s: float) -> Candidate:
+        """Return the candidate with one of its `times` elsewhere."""
+        return replace(self, onset_s=time_s) if end == "onset_s" else replace(self, offset_s=time_s)
+
+    @property
+    def key(self) -> tuple[str, str | None]:
+        """Effect and instance."""
+        return self.effect.id, self.instance
+
+    @property
+    def title(self) -> str:
+        """The effect's title, with the thruster that it is one of."""
+        return titled(self.effect.title, self.instance)
+
+    @property
+    def start(self) -> Floats:
+        """Parameters with which a search begins."""
+        return np.array([one.neutral if one.start is None else one.start for one in self.parameters])
+
+    def act(self, force_model: ForceModel, p: Floats) -> ForceModel:
+        """Return the force model with the effect in it."""
+        return self.effect.act(force_model, p, self.instance, self.onset_s, self.offset_s)
+
+
+def apply_candidates(force_model: ForceModel, candidates: Sequence[Candidate], values: Sequence[Floats]) -> ForceModel:
+    """Return the force model with some candidates in it, each in its turn."""
+    for i in acting_order(candidates):
+        force_model = candidates[i].act(force_model, values[i])
+    return force_model
+
+
+def acting_order(candidates: Sequence[Candidate]) -> list[int]:
+    """Return the places of candidates in the order in which they act."""
+    return sorted(range(len(candidates)), key=lambda i: candidates[i].effect.order)
