@@ -37,6 +37,8 @@ FIRST_DAMPING, LEAST_DAMPING, LARGEST_DAMPING = 1e-2, 1e-5, 1e5
 """Damping of the steps of the search for the likeliest noise, as a share of the information."""
 LONGEST_STEP = 2.0
 """Longest such step, in a parameter's logarithm."""
+SEARCHED_STEPS = 3
+"""Steps of a search before it may be given up: the first ones come from far away."""
 SUFFICIENT_GAIN = 1e-3
 """Gain in log-likelihood of a step that is worth another."""
 
@@ -167,6 +169,7 @@ def fit_noise_with(
         begin[first_searched],
         [bounds[k] for k in first_searched],
         most=INFERENCE.screening_iterations,
+        wanted=INFERENCE.screening_gain - minimum,
     )
     if -best > minimum - INFERENCE.screening_gain:
         best, z = _most_likely(predictions, z, bounds)
@@ -213,7 +216,7 @@ def _widths(cost: Callable[[Floats], float], z: Floats, k: int, best: float) -> 
 
 
 def _most_likely(
-    predictions: Predicting, start: Floats, bounds: list[tuple[float, float]], most: int = 60
+    predictions: Predicting, start: Floats, bounds: list[tuple[float, float]], most: int = 60, wanted: float = np.inf
 ) -> tuple[float, Floats]:
     """Return the least cost nearby, minus the logarithm of the likelihood, and its parameters, shape (k,), by Fisher's scoring.
 
@@ -228,12 +231,15 @@ def _most_likely(
         Where the search begins, shape (k,), and the limits of each parameter.
     most
         Steps at most.
+    wanted
+        Cost above which nobody asks: a search that would stay above it, if each step gained as many times what it promises as
+        `INFERENCE.linearisation_factor`, ends where it is.
     """
     low, high = np.array(bounds).T
     z, damping = np.clip(start, low, high), FIRST_DAMPING
     (whitened,), (log_scales,) = predictions(z[None])
     cost = 0.5 * float(whitened @ whitened) + float(log_scales.sum())
-    for _ in range(most):
+    for count in range(most):
         moves = np.where(z + DIFFERENCE_STEP <= high, DIFFERENCE_STEP, -DIFFERENCE_STEP)
         near_whitened, near_scales = predictions(z + np.diag(moves))
         by_whitened = (near_whitened - whitened) / moves[:, None]
@@ -245,8 +251,13 @@ def _most_likely(
         # What nothing shows stays where it is.
         scale = np.maximum(np.diag(information), 1e-9 * max(float(np.diag(information).max()), 1e-12))
         gained = 0.0
+        reach_low, reach_high = np.maximum(low - z, -LONGEST_STEP), np.minimum(high - z, LONGEST_STEP)
+        if count >= SEARCHED_STEPS and cost > wanted:
+            step = newton_step(information + LEAST_DAMPING * np.diag(scale), slope, reach_low, reach_high)
+            promised = -float(slope @ step + 0.5 * step @ information @ step)
+            if cost - INFERENCE.linearisation_factor * promised > wanted:
+                break
         while damping < LARGEST_DAMPING:
-            reach_low, reach_high = np.maximum(low - z, -LONGEST_STEP), np.minimum(high - z, LONGEST_STEP)
             new = z + newton_step(information + damping * np.diag(scale), slope, reach_low, reach_high)
             (new_whitened,), (new_scales,) = predictions(new[None])
             new_cost = 0.5 * float(new_whitened @ new_whitened) + float(new_scales.sum())
