@@ -124,7 +124,7 @@ NO_DECISION = {
         diagnose.inference.profile_likelihood FIRST_STEP STEP_GROWTH LARGEST_FALL MOST_REFINEMENTS QUANTILES
         diagnose.inference.search COARSE_ITERATIONS
         diagnose.inference.stochastic_disturbance START_STRENGTHS START_FREQUENCIES
-        diagnose.judging.findings TIME_STEP TIME_FIT TIME_FINE_S TIMES_AT_ONCE TIME_STRIDE TIME_STRAIGHT
+        diagnose.judging.findings TIME_STEP TIME_FIT TIME_FINE_S TIMES_AT_ONCE TIME_STRAIGHT
         diagnose.judging.campaign_split WEIGHED
         effects.gusts DIFFERENCE_MPS
         effects.linear_evidence DIFFERENCE_STEP

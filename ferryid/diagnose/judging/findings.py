@@ -42,8 +42,6 @@ TIME_FINE_S = 0.2
 """Fine step between times that are compared [s]: that of the forces."""
 TIMES_AT_ONCE = 4
 """Times to either side that are weighed before it is seen whether to go on."""
-TIME_STRIDE = 4.0
-"""Steps between times farther away: half a window."""
 TIME_STRAIGHT = 0.1
 """How far the log evidence of a time may be off the line between its neighbours before times between them are weighed [nat]."""
 SHOWN_RIVALS = 3
@@ -243,15 +241,14 @@ def _time(problem: EstimationProblem, kept: Fit, index: int, end: str) -> Estima
         ]
         tried.update(zip(new, over(evidence_at, new), strict=True))
 
-    # Several at once, for threads, and farther apart farther away.
-    counts, stride = np.arange(1, TIMES_AT_ONCE + 1), step
+    # Several at once, for threads.
+    counts = np.arange(1, TIMES_AT_ONCE + 1)
     ends = {-1.0: here, 1.0: here}
     while ends:
-        new = {side: (end + side * stride * counts).tolist() for side, end in ends.items()}
+        new = {side: (end + side * step * counts).tolist() for side, end in ends.items()}
         explore([time for times in new.values() for time in times])
         lowest = max(tried.values()) - JUDGING.time_drop
         ends = {side: times[-1] for side, times in new.items() if min(tried.get(one, -inf) for one in times) >= lowest}
-        stride = TIME_STRIDE * step
     # About the likeliest it changes within a step; elsewhere only where it does not lie on a line between its neighbours.
     fine = round(step / TIME_FINE_S)
     likeliest = max(tried, key=tried.__getitem__)

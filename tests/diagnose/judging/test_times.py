@@ -21,9 +21,9 @@ from ferryid.vessel import load_profile
     ("evidence", "most"),
     [
         (lambda t: -4.0 * abs(t - 300.3), 60),
-        (lambda t: -0.5 * ((t - 260.0) / 40.0) ** 2, 300),
-        (lambda t: float(np.logaddexp(-0.3 * abs(t - 300.3), 1.0 - 0.5 * ((t - 180.0) / 9.0) ** 2)), 300),
-        (lambda t: 0.0 if 290.1 < t < 310.5 else -12.0, 300),
+        (lambda t: -0.5 * ((t - 260.0) / 40.0) ** 2, 1100),
+        (lambda t: float(np.logaddexp(-0.3 * abs(t - 300.3), 1.0 - 0.5 * ((t - 180.0) / 9.0) ** 2)), 1100),
+        (lambda t: 0.0 if 290.1 < t < 310.5 else -12.0, 1100),
     ],
     ids=["sharp", "broad", "two tops", "steps"],
 )
