@@ -260,12 +260,11 @@ def _time(problem: EstimationProblem, kept: Fit, index: int, end: str) -> Estima
         halved = [(a, 0.5 * (a + b), b) for a, b in gaps]
         bent = [one for one in halved if abs(tried[one[1]] - 0.5 * (tried[one[0]] + tried[one[2]])) > TIME_STRAIGHT]
         gaps = [pair for one in bent for pair in pairwise(one)]
-    known = np.array(sorted(tried))
-    moments = np.union1d(known, np.arange(known[0], known[-1], TIME_FINE_S))
+    moments = np.array(sorted(tried))
     # Each moment stands for the time about it; the posterior is as much wider as that of other parameters.
     edges = np.concatenate([moments[:1], 0.5 * (moments[1:] + moments[:-1]), moments[-1:]])
     edges[[0, -1]] += np.array([-0.5, 0.5]) * TIME_FINE_S
-    log_weights = np.interp(moments, known, [tried[time] for time in known.tolist()]) / INFERENCE.posterior_factor**2
+    log_weights = np.array([tried[time] for time in moments.tolist()]) / INFERENCE.posterior_factor**2
     weights = np.exp(log_weights - log_weights.max()) * np.diff(edges)
     shares = np.concatenate([[0.0], np.cumsum(weights) / weights.sum()])
     low, middle, high = np.interp([0.025, 0.5, 0.975], shares, edges).tolist()
