@@ -49,7 +49,14 @@ def act(plant: Plant, conditions: Conditions, rng: np.random.Generator) -> None:
     """Add the load of waves and wakes."""
     if conditions["wave_height"] > 0.0 or len(conditions["wakes"]):
         sea = sea_constants(rng, plant.vessel, conditions)
-        plant.loads["waves"] = lambda t, y, out: sea_load(sea, t, y[0], y[1], y[5], out)
+        times, sizes = np.array(conditions["wave_course"]).reshape(-1, 2).T
+
+        def load(t: float, y: Floats, out: Floats) -> None:
+            sea_load(sea, t, y[0], y[1], y[5], out)
+            if times.size:
+                out *= np.interp(t, times, sizes)
+
+        plant.loads["waves"] = load
 
 
 def realised(trial: Trial, conditions: Conditions) -> Mapping[str, float]:
@@ -137,11 +144,19 @@ EFFECT = PlantEffect(
     0.05,
     sample,
     rank=4,
-    settings={"wave_height": 0.0, "wave_period": 2.5, "wave_direction": 0.0, "wave_spread": 20.0, "wakes": ()},
+    settings={
+        "wave_height": 0.0,
+        "wave_period": 2.5,
+        "wave_direction": 0.0,
+        "wave_spread": 20.0,
+        "wave_course": (),
+        "wakes": (),
+    },
     act=act,
     stream=2,
     realised=realised,
     stochastic=True,
 )
-"""Significant height [m], peak period [s], where the sea goes to [deg], and its spread about that [deg]; wakes of boats:
-time [s], height [m], period [s], duration [s], direction [deg]."""
+"""Significant height [m], peak period [s], where the sea goes to [deg], and its spread about that [deg]; its course: rows of
+time [s] and a factor on its forces, linear in between; wakes of boats: time [s], height [m], period [s], duration [s],
+direction [deg]."""
