@@ -1,4 +1,4 @@
-"""Current: water that moves steadily over ground, felt through the relative velocity."""
+"""Current: water that moves steadily over ground, felt through the relative velocity; it may set in or slacken in the log."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.effects.effect import Effect, Parameter, Turbulence, Values
+from ferryid.effects.effect import Effect, Parameter, Turbulence, Values, span
 from ferryid.effects.force_model import ForceModel, Measurements
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.effects.wording import bearing
@@ -41,7 +41,7 @@ def says(values: Values, instance: str | None) -> str:
 
 def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     """Return the scenario's current."""
-    return {"environment": {"current": {"north_mps": values["north"], "east_mps": values["east"]}}}
+    return {"environment": {"current": {"north_mps": values["north"], "east_mps": values["east"], **span(values)}}}
 
 
 def regressor(force_model: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
@@ -57,6 +57,7 @@ EFFECT = Effect(
     says,
     scenario,
     cannot=cannot,
+    onset=True,
     regressor=regressor,
     changes_hull=True,
     negligible=EFFECTS.least_current,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.simulate.added_effects import AddedEffect, unfit
-from ferryid.simulate.sections import Fault, Mooring, Payload, Wind
+from ferryid.simulate.sections import Current, Fault, Mooring, Payload, Wind
 from ferryid.simulate.series import read_series
 from ferryid.vessel import faults
 from ferryid.vessel.load import load_profile
@@ -175,9 +175,10 @@ def _sea(scenario: Scenario) -> Iterator[Doubt]:
             )
 
 
-def _lasting(scenario: Scenario) -> Iterator[tuple[KeyPath, AddedEffect | Wind | Mooring | Payload | Fault]]:
+def _lasting(scenario: Scenario) -> Iterator[tuple[KeyPath, AddedEffect | Current | Wind | Mooring | Payload | Fault]]:
     """Yield everything that has a beginning and an end, with its place in the file."""
     yield ("environment", "wind"), scenario.wind
+    yield ("environment", "current"), scenario.current
     yield ("environment", "mooring"), scenario.mooring
     yield from ((("effects", index), entry) for index, entry in enumerate(scenario.effects))
     yield from ((("payload", index), entry) for index, entry in enumerate(scenario.payload))

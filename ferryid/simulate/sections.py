@@ -66,11 +66,16 @@ class Wind:
 
 @dataclass(frozen=True)
 class Current:
-    """``[environment.current]``: current over ground, where the water goes to; it may turn, clockwise from above."""
+    """``[environment.current]``: current over ground, where the water goes to; it may turn, clockwise from above.
+
+    It runs from `from_s` until `until_s`; the water is still else.
+    """
 
     north_mps: float = signed(0.0, 10.0)
     east_mps: float = signed(0.0, 10.0)
     turn_degpmin: float = signed(0.0, 360.0)
+    from_s: float = limited(0.0)
+    until_s: float = limited(ALWAYS_S)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Current over ground, steady or slowly turning."""
+"""Current over ground, steady or slowly turning, that may set in and slacken."""
 
 from __future__ import annotations
 
@@ -16,9 +16,16 @@ def turn_rate(current: Current) -> float:
     return current.turn_degpmin * pi / 180.0 / 60.0
 
 
-@compiled
-def current_series(north: float, east: float, turn_radps: float, n: int, step_s: float) -> Floats:
+def current_series(current: Current, n: int, step_s: float) -> Floats:
     """Return the velocity of the water over ground every `step_s` seconds, shape (n, 2) [m/s, north and east]."""
+    series = _turning(float(current.north_mps), float(current.east_mps), turn_rate(current), n, step_s)
+    t = np.arange(n) * step_s
+    series[(t < current.from_s) | (t >= current.until_s)] = 0.0
+    return series
+
+
+@compiled
+def _turning(north: float, east: float, turn_radps: float, n: int, step_s: float) -> Floats:
     series = np.empty((n, 2))
     for i in range(n):
         angle = turn_radps * (i * step_s)

@@ -77,15 +77,14 @@ def build(
     p = hydrodynamics(hull)
     m, I_z = float(hull.mass_kg), float(hull.inertia_z)
     n = 2 * steps + 1
-    current, effects = scenario.current, acting(scenario)
+    effects = acting(scenario)
     added = build_added(effects, profile)
-    turn_radps = turn_rate(current)
     return Plant(
         p=p,
         areas=areas_of(profile.wind),
         wind=np.column_stack(wind_series(scenario, seed, n, 0.5 * h)),
-        current=current_series(float(current.north_mps), float(current.east_mps), turn_radps, n, 0.5 * h),
-        turn_radps=turn_radps,
+        current=current_series(scenario.current, n, 0.5 * h),
+        turn_radps=turn_rate(scenario.current),
         phases=phases_of(p, profile, scenario.payload, effects, scenario.thrusters.faults, h, steps),
         gear=gear_of(profile, scenario.thrusters, h, added),
         sea=sea_of(profile, scenario.waves, scenario.wakes, seed, (p[0] - m, p[1] - m, p[4] - I_z)),

@@ -137,7 +137,7 @@ def test_in_a_gap_nothing_begins_or_ends() -> None:
 def test_a_load_that_leaves_is_no_fault_of_the_thrusters(tmp_path: Path) -> None:
     load = "[[payload]]\nmass_kg = 300\nx_m = 0.6\nuntil_s = 400\n"
     case = trial_on(sailed(tmp_path, "leaves", TWELVE + load, 5))
-    known = [one for one in list_candidates(case.plain.measurements)[0] if one.effect.onset]
+    known = [one for one in list_candidates(case.plain.measurements)[0] if one.effect.onset and not one.effect.unsteady]
     found = search(case, lambda stage: None, known=known).fit
     assert [one.key for one in found.candidates] == [("payload", None)]
     (one,) = found.candidates
@@ -150,7 +150,7 @@ def test_a_load_that_leaves_is_no_fault_of_the_thrusters(tmp_path: Path) -> None
 def test_a_fault_that_passes_is_found_with_both_its_ends(tmp_path: Path) -> None:
     fault = '[[thrusters.faults]]\nthruster = "thruster2"\nfactor = 0.55\nfrom_s = 260\nuntil_s = 400\n'
     case = trial_on(sailed(tmp_path, "passes", TWELVE + fault, 6))
-    known = [one for one in list_candidates(case.plain.measurements)[0] if one.effect.onset]
+    known = [one for one in list_candidates(case.plain.measurements)[0] if one.effect.onset and not one.effect.unsteady]
     found = search(case, lambda stage: None, known=known).fit
     assert [one.key for one in found.candidates] == [("thruster_gain", "thruster2")]
     (one,) = found.candidates
@@ -159,10 +159,22 @@ def test_a_fault_that_passes_is_found_with_both_its_ends(tmp_path: Path) -> None
 
 
 @pytest.mark.slow
+def test_a_current_that_sets_in_is_found_with_its_beginning(tmp_path: Path) -> None:
+    current = "[environment.current]\nnorth_mps = 0.1\neast_mps = -0.12\nfrom_s = 300\n"
+    case = trial_on(sailed(tmp_path, "sets in", TWELVE + current, 5))
+    known = [one for one in list_candidates(case.plain.measurements)[0] if one.effect.onset and not one.effect.unsteady]
+    found = search(case, lambda stage: None, known=known).fit
+    assert [one.key for one in found.candidates] == [("current", None)]
+    (one,) = found.candidates
+    assert (one.onset_s, one.offset_s) == (pytest.approx(300.0, abs=5.0), inf)
+    assert found.values[0] == pytest.approx([0.1, -0.12], abs=0.02)
+
+
+@pytest.mark.slow
 def test_a_wind_that_gets_up_is_found_with_its_beginning(tmp_path: Path) -> None:
     wind = "[environment.wind]\nnorth_mps = -3.0\neast_mps = 4.0\nfrom_s = 300\n"
     case = trial_on(sailed(tmp_path, "gets up", TWELVE + wind, 5))
-    known = [one for one in list_candidates(case.plain.measurements)[0] if one.effect.onset]
+    known = [one for one in list_candidates(case.plain.measurements)[0] if one.effect.onset and not one.effect.unsteady]
     found = search(case, lambda stage: None, known=known).fit
     assert [one.key for one in found.candidates] == [("wind", None)]
     (one,) = found.candidates
