@@ -178,6 +178,8 @@ class Effect:
         in a part of the manoeuvres.
     changes_hull
         True where the effect changes how the hull's coefficients act: masses, damping, the flow.
+    of_coefficients
+        True where it is errors of single coefficients of the hull, each by itself: one cause of most of them is likelier.
     piecewise
         True where a parameter is the end of a range, so that the slope where a search begins leads a part of the way only, and
         a fit that ranks it among others takes more steps.
@@ -231,6 +233,7 @@ class Effect:
     formula_error: float = EFFECTS.formula_error
     passing_size: float = 0.0
     changes_hull: bool = False
+    of_coefficients: bool = False
     piecewise: bool = False
     profiled: str = ""
     of_sensor: bool = False

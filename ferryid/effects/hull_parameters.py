@@ -7,7 +7,9 @@ shallow water explain with fewer parameters is theirs. The scale of all forces i
 References
 ----------
 Scott and Berger (2010), Bayes and empirical-Bayes multiplicity adjustment in the variable-selection problem: the number of
-subsets of a size, times that of sizes, is what choosing one of them costs.
+subsets of a size, times that of sizes, is what choosing one of them costs. Each is an error of its own besides, with the odds
+of any effect: many that have one cause, such as fouling or a load, are that. So is a model that is wrong all over: it is of
+another vessel.
 """
 
 from __future__ import annotations
@@ -65,7 +67,8 @@ def _best_subset(G: Floats, b: Floats, names: list[str]) -> tuple[frozenset[str]
 
     def log_alternatives(chosen: frozenset[str]) -> float:
         k = len(chosen)
-        return log(n) + lgamma(n + 1) - lgamma(k + 1) - lgamma(n - k + 1)
+        apart = min(k - 1, EFFECTS.coefficients_apart)
+        return log(n) + lgamma(n + 1) - lgamma(k + 1) - lgamma(n - k + 1) + EFFECTS.coefficient_odds * apart
 
     def score(chosen: frozenset[str]) -> float:
         if not chosen or chosen == SURGE_ALONE:
@@ -131,4 +134,5 @@ EFFECT = Effect(
     choose=choose,
     minimum_change=EFFECTS.coefficient_change,
     changes_hull=True,
+    of_coefficients=True,
 )

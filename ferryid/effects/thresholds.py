@@ -23,6 +23,18 @@ class EffectThresholds:
         "the same of a hull coefficient that is selected as wrong",
         "convention: as large as the coefficient; narrower favours small changes",
     )
+    coefficient_odds: float = threshold(
+        8.0,
+        "nat",
+        "log evidence that each coefficient of the hull beyond the first must bring that is selected as wrong",
+        "derived: the prior odds of any effect, as each is an error of its own; many with one cause are fouling, or a load",
+    )
+    coefficients_apart: int = threshold(
+        3,
+        "coefficients",
+        "most beyond the first that count as errors of their own",
+        "convention: more have a cause in common, be it that the model is of another vessel",
+    )
     coefficient_change: float = threshold(
         0.25,
         "of the coefficient",

@@ -344,9 +344,18 @@ def effect_slopes(problem: EstimationProblem, kept: Fit) -> Floats:
 
 
 def without(problem: EstimationProblem, made: Fit, index: int) -> Fit:
-    """Return the fit of a hypothesis that lacks one of its candidates."""
+    """Return the fit of a hypothesis that lacks one of its candidates.
+
+    Of one that trades with the hull, such as a load, the posterior is a bent ridge: there the way from the profile's hull may
+    end on a lower top than that from the hull beside which it was found.
+    """
     rest = [k for k in range(len(made.candidates)) if k != index]
-    return fit(problem, [made.candidates[k] for k in rest], [made.values[k] for k in rest])
+    candidates, values = [made.candidates[k] for k in rest], [made.values[k] for k in rest]
+    bare = fit(problem, candidates, values)
+    if not any(one.effect.profiled for one in candidates):
+        return bare
+    near = fit(problem, candidates, values, begin=starting_point(problem, made))
+    return max(bare, near, key=lambda one: one.evidence)
 
 
 def choose_parameters(problem: EstimationProblem, beside: Fit, candidate: Candidate) -> Candidate:

@@ -9,6 +9,7 @@ from math import exp, inf
 
 import numpy as np
 
+from ferryid.diagnose.inference.common_cause import with_fewer_coefficients
 from ferryid.diagnose.inference.estimation import (
     Candidate,
     EstimationProblem,
@@ -133,7 +134,7 @@ def search(
         found = _ranked_candidates(problem, chosen, left, about)
         rounds.append(_round(found))
         good = [one for one in found if one.gain > INFERENCE.prior_odds and not is_negligible(problem, one.fit)]
-        best = good[0] if good and len(taken) < INFERENCE.most_effects else None
+        best = _common_cause(problem, good) if good and len(taken) < INFERENCE.most_effects else None
         if best is None:
             chosen = prune(problem, chosen)
         beside, gain = _fit_beside_disturbances(problem, chosen, found, disturbances)
@@ -261,6 +262,29 @@ def _best_fit(
     return max(
         [*throughout, *(refined(one) for one in spans if one.gain > least)], key=lambda one: one.gain, default=None
     )
+
+
+def _common_cause(problem: EstimationProblem, good: Sequence[ScoredCandidate]) -> ScoredCandidate:
+    """Return the best candidate; in the place of coefficients that are wrong by themselves, a likelier cause of them."""
+    best = good[0]
+    if not best.candidate.effect.of_coefficients:
+        return best
+
+    def paired(one: ScoredCandidate) -> tuple[float, ScoredCandidate]:
+        pair = with_fewer_coefficients(problem, one.fit, best.candidate)
+        if pair is None:
+            return 0.0, one
+        fair = problem.with_noise_of(pair)
+        ours, theirs = (fit(fair, made.candidates, made.values).evidence for made in (pair, best.fit))
+        return ours - theirs, one
+
+    causes = [
+        one
+        for one in good[1:]
+        if one.candidate.effect.changes_hull and one.gain > INFERENCE.common_cause_share * best.gain
+    ]
+    gain, cause = max(over(paired, causes), key=lambda pair: pair[0], default=(0.0, best))
+    return cause if gain > 0.0 else best
 
 
 def _round(found: Sequence[ScoredCandidate]) -> Round:

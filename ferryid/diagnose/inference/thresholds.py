@@ -50,6 +50,12 @@ class InferenceThresholds:
         "log evidence that a candidate must be able to gain, or its fit is given up",
         "convention: half, as the noise that a candidate leaves raises its evidence somewhat",
     )
+    common_cause_share: float = threshold(
+        0.5,
+        "of the log evidence",
+        "evidence of an effect, as a share of that of coefficients wrong by themselves, from which it may be their cause",
+        "convention: most of it",
+    )
     compared_candidates: int = threshold(
         5,
         "candidates",
@@ -100,6 +106,12 @@ class InferenceThresholds:
     )
     fastest_share: float = threshold(
         0.4, "of the filter's rate", "highest frequency of a disturbance", "derived: half of the rate is aliased"
+    )
+    least_memory: float = threshold(
+        0.5,
+        "periods",
+        "shortest memory of a disturbance in a narrow band",
+        "convention: a damping ratio of a third; that of waves is about 0.1",
     )
     widest_log: float = threshold(
         9.0,

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import exp, inf
 
+from ferryid.diagnose.inference.common_cause import with_fewer_coefficients
 from ferryid.diagnose.inference.estimation import (
     Candidate,
     EstimationProblem,
@@ -90,7 +91,12 @@ def compare_rivals(problem: EstimationProblem, kept: Fit, index: int, library: S
 
     def settled_in(one: RivalFit) -> RivalFit:
         made = fit(problem, one.fit.candidates, one.fit.values, begin=starting_point(problem, one.fit))
-        return RivalFit(one.candidate, made, made.evidence - kept.evidence)
+        ours = kept.evidence
+        if one.candidate.effect.of_coefficients and candidate.effect.changes_hull and made.evidence > ours:
+            # With some of these coefficients beside it, the cause of the others may be likelier.
+            pair = with_fewer_coefficients(problem, kept, one.candidate)
+            ours = ours if pair is None else max(ours, pair.evidence)
+        return RivalFit(one.candidate, made, made.evidence - ours)
 
     others = [other for other in library if other.key not in taken]
     others = [one for one in others if _may_stand_in(problem, bare, begin, candidate, one)]
