@@ -1,5 +1,7 @@
 """Waves: forces in a narrow band of frequencies, along, across and about the vessel, that nothing measured explains.
 
+They may get up, die away or pass within a log, as wakes do, or grow over it.
+
 A narrow-band Gauss-Markov process on each axis stands for the shaping filter ``K s / (s² + 2 lambda omega_0 s + omega_0²)`` of
 Fossen (2021), section 10.2, driven by white noise.
 """
@@ -66,8 +68,16 @@ def says(values: Values, instance: str | None) -> str:
     ]
     return (
         f"Waves of {1.0 / values['peak_frequency']:.1f} s pushed the vessel with {' and '.join(forces)} "
-        f"({plural(len(forces), 'standard deviation')}), which nothing measured explains."
+        f"({plural(len(forces), 'standard deviation')}), which nothing measured explains{_grown(values)}."
     )
+
+
+def _grown(values: Values) -> str:
+    growth = values.get("growth", 1.0)
+    if growth == 1.0:
+        return ""
+    factor = f"{growth:.2g}" if growth > 1.0 else f"1/{1.0 / growth:.2g}"
+    return f"; from the start of the log to its end they {'grew' if growth > 1.0 else 'fell'} to {factor} of their strength"
 
 
 def scenario(values: Values, instance: str | None) -> dict[str, Any]:
@@ -91,6 +101,7 @@ EFFECT = Effect(
     says,
     scenario,
     in_part=True,
+    onset=True,
     unsteady=unsteady,
     # A tank may have a wave maker.
     rare_in=("tank", "pond"),

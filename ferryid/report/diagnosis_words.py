@@ -42,6 +42,7 @@ NAMES = {
     "moment_std": "standard deviation of the moment",
     "onset": "it began at",
     "offset": "it ended at",
+    "growth": "strength at the end of the log over that at its start",
 }
 """Parameters whose own names are no words."""
 

@@ -2,35 +2,68 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from math import log
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import inf, log
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.diagnose.data.estimate import Estimate
+from ferryid.diagnose.inference.disturbance_course import (
+    ALL_ALONG,
+    StrengthCourse,
+    acting,
+    course_estimates,
+    likeliest_growth,
+    likeliest_span,
+    step_likelihoods,
+)
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, fitted_force_model
-from ferryid.diagnose.inference.noise_estimation import fit_noise, fit_noise_with
+from ferryid.diagnose.inference.noise_estimation import excerpt, fit_noise, fit_noise_with
 from ferryid.diagnose.inference.noise_model import NoiseModel, likelihood, stride_s
 from ferryid.diagnose.inference.thresholds import INFERENCE
-from ferryid.diagnose.inference.weak_form import Windows
+from ferryid.diagnose.inference.weak_form import Windows, steps_of
 from ferryid.effects.effect import Process
 from ferryid.effects.force_model import ForceModel
 from ferryid.types import Floats
 
 START_STRENGTHS, START_FREQUENCIES = (0.3, 1.0), (0.5, 0.7, 1.0, 1.4, 2.0)
 """Where the search begins, as shares of the usual ones; from hardly anything nothing leads on."""
+GIVEN_WAY = 0.3
+"""Share of its own coloured error and push that a channel keeps where a search begins beside less of them: strong waves have
+made its noise theirs, and beside that noise nothing is likelier than the weakest."""
 
 
 @dataclass(frozen=True)
 class DisturbanceState:
-    """A disturbance with its parameters, the standard deviations of their logarithms, and the evidence for it."""
+    """A disturbance.
+
+    Attributes
+    ----------
+    candidate, values, widths
+        What it is, its parameters, and the standard deviations of their logarithms.
+    gain
+        The evidence for it [nat].
+    course
+        How strong it is over the log.
+    times
+        The parameters of that course, with their intervals: see `course_estimates`.
+    in_velocities
+        True where it was found in the velocities, and positions hardly show it.
+    gain_in_velocities
+        Evidence for it in the velocities [nat]; infinite where these say nothing.
+    """
 
     candidate: Candidate
     values: Floats
     widths: Floats
     gain: float
+    course: StrengthCourse = ALL_ALONG
+    times: Mapping[str, Estimate] = field(default_factory=dict)
+    in_velocities: bool = False
+    gain_in_velocities: float = inf
 
     @property
     def known(self) -> frozenset[str]:
@@ -65,7 +98,8 @@ def fit_disturbances(
     """Return the trial with the disturbances in its filter that what a fit leaves speaks for, and these.
 
     Each is weighed by its likelihood, at its most likely parameters and noise, less Schwarz's penalty for its parameters and
-    what its prior odds are lower where the log was recorded.
+    what its prior odds are lower where the log was recorded. One in a narrow band is looked for in the velocities as well: a
+    gyroscope shows small waves that the error of a compass hides.
 
     Parameters
     ----------
@@ -86,7 +120,49 @@ def fit_disturbances(
     steps = problem.excerpt
     gaps = steps.gap(force_model)
     noise = fit_noise(steps, gaps, problem.filter)
-    before = {state.candidate.key: [state.values] for state in initial}
+    seen = [one for one in initial if not one.in_velocities]
+    noise, states = _selected(
+        steps, gaps, noise, candidates, force_model, minimum_gain, {one.candidate.key: one for one in seen}
+    )
+    velocities = _velocity_steps(problem)
+    narrow = [one for one in candidates if any(parameter.unit == "Hz" for parameter in one.parameters)]
+    if velocities is not None and narrow:
+        found = {state.candidate.key for state in states}
+        theirs = velocities.gap(force_model)
+        alone = fit_noise(velocities, theirs)
+        shown = [_shown(velocities, theirs, alone, state, force_model) for state in states]
+        states = [replace(state, gain_in_velocities=gain) for state, gain in zip(states, shown, strict=True)]
+        missing = [one for one in narrow if one.key not in found]
+        before = {one.candidate.key: one for one in initial if one.in_velocities}
+        for state in _selected(velocities, theirs, alone, missing, force_model, minimum_gain, before)[1]:
+            pushes = _pushes(state, force_model)
+            states.append(replace(state, in_velocities=True, gain_in_velocities=state.gain))
+            noise = NoiseModel(noise.channels, (*noise.processes, *pushes), force_model)
+    plain = undisturbed
+    for state in states:
+        # On average, too, they may do something.
+        plain = state.candidate.act(plain, state.values)
+    return replace(problem.with_noise_of(made), filter=noise, plain=plain), tuple(states)
+
+
+class _Found(NamedTuple):
+    """Noise with a disturbance, the disturbance, and the log-likelihood with it."""
+
+    noise: NoiseModel
+    state: DisturbanceState
+    after: float
+
+
+def _selected(
+    steps: Windows,
+    gaps: Floats,
+    noise: NoiseModel,
+    candidates: Sequence[Candidate],
+    force_model: ForceModel,
+    minimum_gain: float,
+    before: Mapping[tuple[str, str | None], DisturbanceState],
+) -> tuple[NoiseModel, list[DisturbanceState]]:
+    """Return the noise with the disturbances that gaps speak for, the strongest first, and these."""
     best = likelihood(noise, steps, gaps)
     states: list[DisturbanceState] = []
     left = list(candidates)
@@ -98,41 +174,172 @@ def fit_disturbances(
             processes = candidate.effect.unsteady(force_model)
             if not processes(_usual_values(candidate)):
                 continue
-            places = before.get(candidate.key, _starts(candidate))
-            start = max(places, key=lambda one: _log_likelihood(steps, gaps, noise, processes(one), force_model))
-            penalty = 0.5 * len(start) * log(len(steps.starts)) + candidate.log_alternatives
-            fitted_noise, values, widths, after = fit_noise_with(
-                steps, gaps, noise, processes, start, force_model, best + penalty + required_gain
-            )
-            gain = after - best - penalty
-            if _is_identified(candidate, values, widths, stride_s(steps)):
-                tried.append((gain, fitted_noise, DisturbanceState(candidate, values, widths, gain), after))
+            penalty = 0.5 * len(candidate.parameters) * log(len(steps.starts)) + candidate.log_alternatives
+            places = _places(steps, gaps, noise, candidate, force_model, before.get(candidate.key))
+            for start, course, beside in places:
+                dear = penalty + course.cost(len(steps.starts))
+                fitted_noise, values, widths, after = fit_noise_with(
+                    steps,
+                    gaps,
+                    beside,
+                    acting(processes, course, force_model),
+                    start,
+                    force_model,
+                    best + dear + required_gain,
+                )
+                gain = after - best - dear
+                if _is_identified(candidate, values, widths, stride_s(steps)):
+                    state = DisturbanceState(candidate, values, widths, gain, course)
+                    tried.append((gain, fitted_noise, state, after))
         if not tried:
             break
         gain, fitted_noise, state, after = max(tried, key=lambda one: one[0])
         if gain < required_gain:
             break
+        if state.candidate.effect.onset:
+            fitted_noise, state, after = _with_course(steps, gaps, noise, fitted_noise, state, after, force_model)
         noise, best = fitted_noise, after
         states.append(state)
         left.remove(state.candidate)
-    plain = undisturbed
-    for state in states:
-        # On average, too, they may do something.
-        plain = state.candidate.act(plain, state.values)
-    return replace(problem.with_noise_of(made), filter=noise, plain=plain), tuple(states)
+    return noise, states
+
+
+def _places(
+    steps: Windows,
+    gaps: Floats,
+    noise: NoiseModel,
+    candidate: Candidate,
+    force_model: ForceModel,
+    before: DisturbanceState | None,
+) -> list[tuple[Floats, StrengthCourse, NoiseModel]]:
+    """Return where the search for a disturbance begins: parameters, course, and the channels' noise.
+
+    The likeliest all along, beside the noise as it is and as it may be with the disturbance, and those in a span of the log.
+    """
+    if before is not None:
+        return [(before.values, before.course, noise)]
+    assert candidate.effect.unsteady is not None
+    processes = candidate.effect.unsteady(force_model)
+    starts = _starts(candidate)
+    bare = step_likelihoods(steps, gaps, noise)
+
+    def levels(channels: Floats) -> list[Floats]:
+        every = (NoiseModel(channels, (*noise.processes, *processes(one)), force_model) for one in starts)
+        return [step_likelihoods(steps, gaps, one) for one in every]
+
+    def best_of(likelihoods: list[Floats]) -> Floats:
+        return starts[int(np.argmax([one.sum() for one in likelihoods]))]
+
+    gained = [one - bare for one in levels(noise.channels)]
+    places = [(best_of(gained), ALL_ALONG, noise)]
+    if candidate.effect.onset:
+        less = noise.channels * [1.0, GIVEN_WAY, 1.0, GIVEN_WAY, 1.0]
+        places.append((best_of(levels(less)), ALL_ALONG, replace(noise, channels=less)))
+    if candidate.effect.onset:
+        spans = [likeliest_span(steps, one) for one in gained]
+        k = int(np.argmax([gain for _, gain in spans]))
+        # Of one that is strong all along, the span is found beside it.
+        if spans[k][0].ends and spans[k][1] > 0.0:
+            places.append((starts[k], spans[k][0], noise))
+    return places
+
+
+def _with_course(
+    steps: Windows,
+    gaps: Floats,
+    bare: NoiseModel,
+    fitted: NoiseModel,
+    state: DisturbanceState,
+    after: float,
+    force_model: ForceModel,
+) -> _Found:
+    """Return noise, state and log-likelihood with a disturbance in the likeliest course of its strength."""
+    candidate, n = state.candidate, len(steps.starts)
+    assert candidate.effect.unsteady is not None
+    processes = candidate.effect.unsteady(force_model)
+
+    def noise_in(course: StrengthCourse, channels: Floats, values: Floats) -> NoiseModel:
+        own = acting(processes, course, force_model)(values)
+        return NoiseModel(channels, (*bare.processes, *own), force_model)
+
+    def span_of(channels: Floats, values: Floats) -> StrengthCourse:
+        without = replace(bare, channels=channels)
+        every = (step_likelihoods(steps, gaps, one) for one in (noise_in(ALL_ALONG, channels, values), without))
+        return likeliest_span(steps, next(every) - next(every))[0]
+
+    def better_in(course: StrengthCourse, found: _Found) -> _Found:
+        if course == found.state.course:
+            return found
+        made, values, widths, after = fit_noise_with(
+            steps,
+            gaps,
+            replace(bare, channels=found.noise.channels),
+            acting(processes, course, force_model),
+            found.state.values,
+            force_model,
+        )
+        gain = after - course.cost(n) - found.after + found.state.course.cost(n)
+        if gain <= 0.0 or not _is_identified(candidate, values, widths, stride_s(steps)):
+            return found
+        return _Found(made, DisturbanceState(candidate, values, widths, found.state.gain + gain, course), after)
+
+    found = _Found(fitted, state, after)
+    if not state.course.ends:
+        # What it explains all along leaves a channel nothing of its own: calm is what the noise without it is of.
+        found = better_in(span_of(bare.channels, state.values), found)
+    growth, likely = likeliest_growth(steps, gaps, lambda one: noise_in(one, fitted.channels, state.values))
+    if likely - growth.cost(n) > found.after - found.state.course.cost(n):
+        found = better_in(growth, found)
+    if found.state.course.ends:
+        found = better_in(span_of(found.noise.channels, found.state.values), found)
+    if found.state.course == ALL_ALONG:
+        return found
+    channels, values = found.noise.channels, found.state.values
+    times = course_estimates(
+        found.state.course,
+        steps,
+        gaps,
+        lambda one: noise_in(one, channels, values),
+        replace(bare, channels=channels),
+    )
+    return found._replace(state=replace(found.state, times=times))
+
+
+def _velocity_steps(problem: EstimationProblem) -> Windows | None:
+    """Return steps of the velocities, from which noise is learnt; None where these are fitted anyway, or missing."""
+    windows = problem.windows
+    if not windows.channels[0] or not np.isfinite(windows.measurements.nu_raw[windows.measurements.usable]).all():
+        return None
+    return excerpt(steps_of(replace(windows, channels=~windows.channels)))
+
+
+def _shown(steps: Windows, gaps: Floats, alone: NoiseModel, state: DisturbanceState, force_model: ForceModel) -> float:
+    """Return how much likelier velocities are with a disturbance that positions show, less what its parameters cost."""
+    assert state.candidate.effect.unsteady is not None
+    processes = acting(state.candidate.effect.unsteady(force_model), state.course, force_model)
+    _, _, _, after = fit_noise_with(steps, gaps, alone, processes, state.values, force_model)
+    return after - likelihood(alone, steps, gaps) - 0.5 * len(state.values) * log(len(steps.starts))
+
+
+def _pushes(state: DisturbanceState, force_model: ForceModel) -> tuple[Process, ...]:
+    assert state.candidate.effect.unsteady is not None
+    return acting(state.candidate.effect.unsteady(force_model), state.course, force_model)(state.values)
 
 
 def _is_identified(candidate: Candidate, values: Floats, widths: Floats, step_s: float) -> bool:
     """Tell whether a disturbance is known: how fast it is, how strong on one axis at least, and its moment if it has one.
 
     A position's error in a narrow band looks like a force along it, but turns nothing; what is faster than the filter's steps
-    was not seen by it; and waves slower than any sea are none.
+    was not seen by it; waves slower than any sea are none; and what forgets itself within half a period is no narrow band.
     """
     band = np.array([parameter.unit == "Hz" for parameter in candidate.parameters])
     possible = all(
         one.low <= value <= one.high for one, value in zip(candidate.parameters, values.tolist(), strict=True)
     )
     if not possible or (values[band] * step_s > INFERENCE.fastest_share).any():
+        return False
+    memory = np.array([parameter.name == "time_constant" for parameter in candidate.parameters])
+    if band.any() and float(values[memory][0] * values[band][0]) < INFERENCE.least_memory:
         return False
     strength = _strengths(candidate)
     turning = np.array([parameter.unit == "N·m" for parameter in candidate.parameters])
@@ -143,12 +350,6 @@ def _is_identified(candidate: Candidate, values: Floats, widths: Floats, step_s:
 
 def _strengths(candidate: Candidate) -> NDArray[np.bool_]:
     return np.array([parameter.name.endswith("std") for parameter in candidate.parameters])
-
-
-def _log_likelihood(
-    steps: Windows, gaps: Floats, noise: NoiseModel, processes: tuple[Process, ...], force_model: ForceModel
-) -> float:
-    return likelihood(NoiseModel(noise.channels, (*noise.processes, *processes), force_model), steps, gaps)
 
 
 def _starts(candidate: Candidate) -> list[Floats]:

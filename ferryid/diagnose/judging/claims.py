@@ -49,6 +49,8 @@ class Figures:
         Of what begins and ends within the log, its size over the one that hull and formulas may be off by.
     power_in_velocities
         Share of a disturbance's power that the velocities show, about its peak.
+    gain_in_velocities
+        Evidence for a disturbance in the velocities alone [nat].
     other_logs
         What the other logs of a campaign say of a law; None where there are none.
     doubt
@@ -65,6 +67,7 @@ class Figures:
     single_visit: bool = False
     passes: float = inf
     power_in_velocities: float = inf
+    gain_in_velocities: float = inf
     other_logs: OtherLogs | None = None
     doubt: str = ""
 

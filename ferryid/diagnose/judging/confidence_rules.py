@@ -123,8 +123,11 @@ def law_of_one_log(finding: Finding, context: Context, _threshold: float) -> Out
 
 @rule(JUDGING.power_in_velocities, "of the power")
 def absent_in_velocities(finding: Finding, context: Context, threshold: float) -> Outcome:
-    """Lower a disturbance of whose power the velocities show less: errors of positions look like a force, too."""
-    if context.own.power_in_velocities >= threshold:
+    """Lower a disturbance of whose power the velocities show less, or none: errors of positions look like a force, too.
+
+    They show it by as much evidence as any effect needs.
+    """
+    if context.own.power_in_velocities >= threshold and context.own.gain_in_velocities > INFERENCE.prior_odds:
         return finding, ""
     says = f"{finding.says} The velocities do not show it: it may be an error of the positions."
     return lowered(replace(finding, says=says)), ""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from math import exp, inf
 from typing import Any
 
@@ -40,8 +41,23 @@ def disturbance_claims(
         The log's measurements at its full rate.
     """
     short = fine_windows(problem, measurements)
-    frequency, power = spectrum_of(short, force_errors(short, fitted_force_model(problem.plain, made), problem.plain))
-    return [_claim(problem, state, short, frequency, power) for state in states]
+    errors = force_errors(short, fitted_force_model(problem.plain, made), problem.plain)
+    claims = []
+    for state in states:
+        acts = _while_acting(short, state)
+        claims.append(_claim(problem, state, acts, *spectrum_of(acts, errors)))
+    return claims
+
+
+def _while_acting(short: Windows, state: DisturbanceState) -> Windows:
+    """Return windows of which only those within the span of a disturbance belong to a series."""
+    if not state.course.ends:
+        return short
+    times = short.middle_s
+    first = int(np.searchsorted(times, state.course.onset_s))
+    end = int(np.searchsorted(times, state.course.offset_s))
+    runs = [(max(a, first), min(b, end)) for a, b in short.runs]
+    return replace(short, runs=tuple((a, b) for a, b in runs if b > a))
 
 
 def density(process: Process, frequency_hz: Floats) -> Floats:
@@ -86,7 +102,7 @@ def _claim(
     measurements = problem.windows.measurements
     candidate = state.candidate
     assert candidate.effect.unsteady is not None
-    parameters = {name: one for name, one in state.estimates.items() if name in state.known}
+    parameters = {**{name: one for name, one in state.estimates.items() if name in state.known}, **state.times}
     force_model = problem.filter.force_model or problem.plain
     pushes = candidate.effect.unsteady(force_model)(state.values)
     pushed = [np.mean((one.std * one.force) ** 2, axis=0) for one in pushes]
@@ -94,6 +110,8 @@ def _claim(
     arm = np.array([1.0, 1.0, np.sqrt(force_model.hull[0] / force_model.hull[4])])
     power = np.sum(pushed, axis=0) * arm**2
     values = {name: one.value for name, one in parameters.items()}
+    first, last = float(measurements.t[0]), float(measurements.t[-1])
+    onset, offset = (state.times[name].value if name in state.times else None for name in ("onset", "offset"))
     shown = _columns(short, frequency, spectrum, pushes, int(np.argmax(power)))
     finding = Finding(
         effect=candidate.effect.id,
@@ -101,13 +119,23 @@ def _claim(
         probability=1.0 / (1.0 + exp(min(INFERENCE.disturbance_gain - state.gain, 50.0))),
         parameters=parameters,
         axes=dict(zip(AXES, (power / power.sum()).tolist(), strict=True)),
-        intervals=((float(measurements.t[0]), float(measurements.t[-1])),),
+        intervals=((first if onset is None else onset, last if offset is None else offset),),
+        onset_s=onset,
+        offset_s=offset,
         says=candidate.effect.says(values, None),
         **shown,
     )
     power_in_velocities = _power_in_velocities(shown["evidence"]) if shown else inf
     doubt = value_doubt(candidate.effect, candidate.parameters, values, measurements.profile)
-    return Claim(finding, Figures("disturbance", power_in_velocities=power_in_velocities, doubt=doubt))
+    return Claim(
+        finding,
+        Figures(
+            "disturbance",
+            power_in_velocities=power_in_velocities,
+            gain_in_velocities=state.gain_in_velocities,
+            doubt=doubt,
+        ),
+    )
 
 
 def _power_in_velocities(evidence: Mapping[str, Floats]) -> float:

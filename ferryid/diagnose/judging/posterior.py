@@ -129,7 +129,10 @@ def posterior_of(
     for state in states:
         candidate = state.candidate
         if candidate.key in reported and reported[candidate.key].sure:
-            source = Source(motion.log, recording.sha256, reported[candidate.key].probability)
+            finding = reported[candidate.key]
+            source = Source(
+                motion.log, recording.sha256, finding.probability, finding.onset_s, offset_s=finding.offset_s
+            )
             found = {
                 name: Quantity(one.value, one.low, one.high, one.unit)
                 if name in state.known

@@ -8,6 +8,7 @@ from math import inf, nextafter
 import pytest
 
 from ferryid.diagnose.data.estimate import Estimate
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.claims import Claim, Figures, Kind, LogFigures, OtherLogs
 from ferryid.diagnose.judging.confidence_rules import (
     RULES,
@@ -98,6 +99,11 @@ def test_a_disturbance_that_the_velocities_lack_is_a_hint() -> None:
     assert judged is not None
     assert not judged.sure
     assert judged.says == "It is there. The velocities do not show it: it may be an error of the positions."
+    odds = INFERENCE.prior_odds
+    assert stands(absent_in_velocities, found("waves"), on("disturbance", gain_in_velocities=nextafter(odds, inf)))
+    judged, _ = absent_in_velocities(found("waves"), on("disturbance", gain_in_velocities=odds))
+    assert judged is not None
+    assert not judged.sure
 
 
 @pytest.mark.parametrize(
