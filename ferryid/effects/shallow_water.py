@@ -130,10 +130,14 @@ def unreported(measurements: Measurements, p: Floats) -> frozenset[str]:
 
 
 def single_visit(measurements: Measurements, p: Floats) -> bool:
-    """Tell whether the vessel was in the place a single time, or hardly: then it is a time as well as a place."""
+    """Tell whether the vessel was in the place a single time, or hardly: then it is a time as well as a place.
+
+    Over a narrow strip it is hardly at all, but often: what else comes and goes does not do so at every visit.
+    """
     there = inside(measurements, p[1:5])[measurements.usable] > 0.5
     entered = int(there[0]) + int(np.count_nonzero(there[1:] & ~there[:-1]))
-    return entered < 2 or float(np.mean(there)) < EFFECTS.least_place
+    hardly = float(np.mean(there)) < EFFECTS.least_place and entered < EFFECTS.many_visits
+    return entered < 2 or hardly
 
 
 def says(values: Values, instance: str | None) -> str:

@@ -171,6 +171,12 @@ class EffectThresholds:
     least_place: float = threshold(
         0.05, "of the log", "least share of a log that lies in a place of shallow water", "convention: a twentieth"
     )
+    many_visits: int = threshold(
+        4,
+        "visits",
+        "visits from which on a place of shallow water needs no share of the log",
+        "convention: more than one in each part that is held out; something else does not come with every visit",
+    )
     most_place: float = threshold(
         0.8,
         "of the log",

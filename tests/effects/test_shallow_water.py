@@ -83,6 +83,19 @@ def test_a_place_that_was_visited_once_is_a_time_as_well() -> None:
         assert EFFECT.single_visit(replace(force_model.measurements, eta=eta), p) == wanted, times
 
 
+@pytest.mark.parametrize(("visits", "wanted"), [(1, True), (3, True), (4, False), (6, False)])
+def test_a_strip_that_is_crossed_often_needs_no_share_of_the_log(visits: int, wanted: bool) -> None:
+    force_model, p = sailed(), values(south=0.0, north=10.0, west=0.0, east=10.0)
+    measurements = force_model.measurements
+    there = np.zeros(len(measurements.t), dtype=np.bool_)
+    # Four per cent of the log in all.
+    length = int(0.04 * len(there) / visits)
+    for first in np.linspace(0.1, 0.9, visits) * len(there):
+        there[int(first) : int(first) + length] = True
+    eta = np.where(there[:, None], [5.0, 5.0, 0.0], [5.0, 50.0, 0.0])
+    assert EFFECT.single_visit(replace(measurements, eta=eta), p) == wanted
+
+
 def test_a_place_is_chosen_in_little_memory_and_the_same_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     force_model = sailed()
     p = values(south=30.0, north=60.0, west=10.0, east=30.0)
