@@ -99,7 +99,8 @@ def fit_disturbances(
 
     Each is weighed by its likelihood, at its most likely parameters and noise, less Schwarz's penalty for its parameters and
     what its prior odds are lower where the log was recorded. One in a narrow band is looked for in the velocities as well: a
-    gyroscope shows small waves that the error of a compass hides.
+    gyroscope shows small waves that the error of a compass hides. Only beside a hull that the profile knows: what a guessed one
+    leaves has bursts in narrow bands of its own, and so has the noise of receivers.
 
     Parameters
     ----------
@@ -120,21 +121,24 @@ def fit_disturbances(
     steps = problem.excerpt
     gaps = steps.gap(force_model)
     noise = fit_noise(steps, gaps, problem.filter)
+    known = problem.plain.measurements.profile.hull.has_model
     seen = [one for one in initial if not one.in_velocities]
-    noise, states = _selected(
-        steps, gaps, noise, candidates, force_model, minimum_gain, {one.candidate.key: one for one in seen}
-    )
-    velocities = _velocity_steps(problem)
+    before = {one.candidate.key: one for one in seen}
+    noise, states = _selected(steps, gaps, noise, candidates, force_model, minimum_gain, before, closely=known)
+    velocities = _velocity_steps(problem) if known else None
     narrow = [one for one in candidates if any(parameter.unit == "Hz" for parameter in one.parameters)]
-    if velocities is not None and narrow:
+    # Small ones wait for what explains more.
+    last = minimum_gain <= INFERENCE.disturbance_gain
+    if velocities is not None and narrow and (states or last):
         found = {state.candidate.key for state in states}
         theirs = velocities.gap(force_model)
         alone = fit_noise(velocities, theirs)
         shown = [_shown(velocities, theirs, alone, state, force_model) for state in states]
         states = [replace(state, gain_in_velocities=gain) for state, gain in zip(states, shown, strict=True)]
-        missing = [one for one in narrow if one.key not in found]
+        missing = [one for one in narrow if last and one.key not in found]
         before = {one.candidate.key: one for one in initial if one.in_velocities}
-        for state in _selected(velocities, theirs, alone, missing, force_model, minimum_gain, before)[1]:
+        more = _selected(velocities, theirs, alone, missing, force_model, minimum_gain, before, closely=True)[1]
+        for state in more:
             pushes = _pushes(state, force_model)
             states.append(replace(state, in_velocities=True, gain_in_velocities=state.gain))
             noise = NoiseModel(noise.channels, (*noise.processes, *pushes), force_model)
@@ -161,8 +165,13 @@ def _selected(
     force_model: ForceModel,
     minimum_gain: float,
     before: Mapping[tuple[str, str | None], DisturbanceState],
+    *,
+    closely: bool,
 ) -> tuple[NoiseModel, list[DisturbanceState]]:
-    """Return the noise with the disturbances that gaps speak for, the strongest first, and these."""
+    """Return the noise with the disturbances that gaps speak for, the strongest first, and these.
+
+    `closely`: in spans of the log as well, and beside noise that has given way to them.
+    """
     best = likelihood(noise, steps, gaps)
     states: list[DisturbanceState] = []
     left = list(candidates)
@@ -175,7 +184,8 @@ def _selected(
             if not processes(_usual_values(candidate)):
                 continue
             penalty = 0.5 * len(candidate.parameters) * log(len(steps.starts)) + candidate.log_alternatives
-            places = _places(steps, gaps, noise, candidate, force_model, before.get(candidate.key))
+            looks = closely and candidate.effect.onset
+            places = _places(steps, gaps, noise, candidate, force_model, before.get(candidate.key), closely=looks)
             for start, course, beside in places:
                 dear = penalty + course.cost(len(steps.starts))
                 fitted_noise, values, widths, after = fit_noise_with(
@@ -196,7 +206,7 @@ def _selected(
         gain, fitted_noise, state, after = max(tried, key=lambda one: one[0])
         if gain < required_gain:
             break
-        if state.candidate.effect.onset:
+        if closely and state.candidate.effect.onset:
             fitted_noise, state, after = _with_course(steps, gaps, noise, fitted_noise, state, after, force_model)
         noise, best = fitted_noise, after
         states.append(state)
@@ -211,6 +221,8 @@ def _places(
     candidate: Candidate,
     force_model: ForceModel,
     before: DisturbanceState | None,
+    *,
+    closely: bool,
 ) -> list[tuple[Floats, StrengthCourse, NoiseModel]]:
     """Return where the search for a disturbance begins: parameters, course, and the channels' noise.
 
@@ -232,10 +244,10 @@ def _places(
 
     gained = [one - bare for one in levels(noise.channels)]
     places = [(best_of(gained), ALL_ALONG, noise)]
-    if candidate.effect.onset:
+    if closely:
         less = noise.channels * [1.0, GIVEN_WAY, 1.0, GIVEN_WAY, 1.0]
         places.append((best_of(levels(less)), ALL_ALONG, replace(noise, channels=less)))
-    if candidate.effect.onset:
+    if closely:
         spans = [likeliest_span(steps, one) for one in gained]
         k = int(np.argmax([gain for _, gain in spans]))
         # Of one that is strong all along, the span is found beside it.
