@@ -70,6 +70,8 @@ class Case(Record):
         Coefficients that the profile's hull lacks.
     thruster_shift
         By how many lengths the profile has the first thruster too far forward.
+    oracle_size
+        Size that an oracle sees, of which `size` is a multiple; 0 where that is not known before the diagnosis.
     """
 
     name: str
@@ -87,6 +89,7 @@ class Case(Record):
     hull_factors: Mapping[str, float] = field(default_factory=dict)
     omitted_terms: tuple[str, ...] = ()
     thruster_shift: float = 0.0
+    oracle_size: float = 0.0
 
 
 def parameter_vectors(names: Sequence[str]) -> list[tuple[str, ...]]:

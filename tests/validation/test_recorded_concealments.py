@@ -393,10 +393,22 @@ def test_a_rudder_carries_no_load() -> None:
     assert made.why == "its actuators cannot push that way"
 
 
+def sailed_astern() -> RecordedLog:
+    """Return the ferry with records of the first thruster that are negative now and then."""
+    log = ferry()
+    column = next(iter(drives(log).values())).column
+    values = log.columns[column]
+    return log.changed({column: np.where(np.arange(len(values)) % 3 == 0, -values, values)})
+
+
 @pytest.mark.parametrize("one", concealments().values(), ids=lambda one: one.id)
 def test_every_concealment(one: Concealment) -> None:
     """Its truth has the parameters that a finding has, and nothing but its own signals changes."""
     log = ferry()
+    if one.id == "astern_asymmetry":
+        # Its thrusters turn round instead of pushing astern.
+        assert one.cannot(log) == "no actuator of it pushes both ways"
+        log = sailed_astern()
     assert one.cannot(log) == ""
     least, most = one.sizes(log)
     assert 0.0 < least < most
@@ -404,7 +416,10 @@ def test_every_concealment(one: Concealment) -> None:
     assert truth.effect == one.id
     if one.id in effects():
         assert truth.instance in effects()[one.id].instances(log.profile)
-        assert set(truth.values) <= {parameter.name for parameter in effects()[one.id].parameters_of(log.profile)}
+        # Of a limit, which is where the motion has it, the size is what the record claims beyond.
+        assert set(truth.values) - {"lost"} <= {
+            parameter.name for parameter in effects()[one.id].parameters_of(log.profile)
+        }
     made = one.conceal(log, truth, np.random.default_rng(3))
     assert made.log is not log
     assert made.missed <= 0.02

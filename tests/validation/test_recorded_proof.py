@@ -62,7 +62,7 @@ def validated(out: Path, log: Path, **options: Any) -> dict[str, Any]:
 
 @pytest.mark.slow
 def test_from_the_recording_to_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    log, out = zigzag(tmp_path / "zigzag.dat", 170.0), tmp_path / "out"
+    log, out = zigzag(tmp_path / "zigzag.dat", 240.0), tmp_path / "out"
     surveyor = Surveyor(log)
     monkeypatch.setattr(stages, "worker_of", lambda run: surveyor)
     result = validated(out, log)
@@ -91,7 +91,7 @@ def test_from_the_recording_to_the_page(tmp_path: Path, monkeypatch: pytest.Monk
     # Other recordings are another run.
     (folder / "result.json").unlink()
     with pytest.raises(FerryIdError, match="unfinished run of another seed"):
-        validated(out, zigzag(tmp_path / "zigzag.dat", 171.0))
+        validated(out, zigzag(tmp_path / "zigzag.dat", 241.0))
 
 
 ARM = Truth("lever_arm", None, {"x": 1.0, "y": 0.0})

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import isinf
 from zlib import crc32
 
 import numpy as np
@@ -18,17 +19,24 @@ from ferryid.validation.case_sampling import LEVELS, check_runs, numbered
 from ferryid.validation.recorded.effects import Concealed, Concealment, concealments
 from ferryid.validation.recorded.log import RecordedLog, cached_log
 from ferryid.validation.recorded.manifest import Recording
+from ferryid.validation.recorded.oracle_size import baselines, oracle_size
 
 KINDS = ("clean", "single", "span")
 """Kinds of cells: recordings as they are, one effect all along, and one that begins within the recording."""
-TURNS = (3, 1, 4, 2, 0)
-"""Sizes in the order of the runs: a single run is one that a user would want to know of."""
+MULTIPLES = (0.5, 1.0, 2.0, 4.0, 8.0)
+"""Sizes of the detection curve, as multiples of the oracle's."""
+SPREAD = 0.5
+"""How much larger a size may be, as a share of the way to the next of them by the logarithm."""
+TURNS = (2, 3, 1, 4, 0)
+"""Sizes in the order of the runs: a single run is at twice the oracle's, where nine in ten ought to be named."""
+TWICE = 2
+"""Which of the sizes that is."""
 MOST_MISSED = 0.02
 """Share of the rewritten rows that may lack what expresses an effect."""
 LATER = (0.3, 0.6)
 """When an effect begins, as shares of the recording."""
-LARGE = (0.6, 0.95)
-"""How large it then is, as shares of the way from its smallest to its largest size by the logarithm."""
+LARGE = (3.0, 8.0)
+"""How large it then is, as multiples of the oracle's size."""
 
 
 @dataclass(frozen=True)
@@ -161,6 +169,9 @@ def _of_effect(
         for number in range(max(1, round(many))):
             rng = np.random.default_rng([seed, _key(recording, f"{one.id} {kind}"), number])
             case = _drawn(recording, logs, one, kind, number, rng)
+            if isinstance(case, NotMade):
+                lacking.append(case)
+                continue
             made = [concealed(log, case.truths[0], case.seed) for log in logs]
             worst = max(made, key=lambda each: each.missed)
             if worst.missed > MOST_MISSED:
@@ -181,14 +192,26 @@ def _drawn(
     kind: str,
     number: int,
     rng: np.random.Generator,
-) -> Case:
+) -> Case | NotMade:
     level = TURNS[number % LEVELS]
-    share = (level + rng.uniform()) / LEVELS if kind == "single" else rng.uniform(*LARGE)
+    multiple = MULTIPLES[level] * float(MULTIPLES[1] / MULTIPLES[0]) ** (SPREAD * rng.uniform())
+    if kind != "single":
+        multiple = float(np.exp(rng.uniform(*np.log(LARGE))))
     begin = None if kind == "single" else float(rng.uniform(*LATER)) * logs[0].duration_s
-    least, most = one.sizes(logs[0])
-    size = float(least * (most / least) ** share)
-    truth = one.sample(size, logs[0], rng, (begin, None))
-    return _case(recording, logs, one.id, kind, rng, truth, level if kind == "single" else None, size)
+    drawn = int(rng.integers(2**31))
+
+    def truth_of(size: float) -> Truth:
+        # Direction, thruster and times are the same for every size.
+        return one.sample(size, logs[0], np.random.default_rng(drawn), (begin, None))
+
+    least = oracle_size(one, baselines(recording.logs, recording.vessel), truth_of)
+    size, most = multiple * least, one.sizes(logs[0])[1]
+    if size > most:
+        seen = "an oracle sees none" if isinf(least) else f"an oracle needs {least:.3g} {one.unit}"
+        text = f"{one.id} of {multiple:.2g} times the oracle's size was not made in {recording.name}: {seen},"
+        return NotMade(recording.name, one.id, 0.0, f"{text} and sizes end at {most:.3g} {one.unit}.")
+    case = _case(recording, logs, one.id, kind, rng, truth_of(size), level if kind == "single" else None, size)
+    return replace(case, oracle_size=least, allowed=one.allowed)
 
 
 def _case(

@@ -36,7 +36,10 @@ def air_of(profile: Profile) -> AirConstants:
 
 
 def wind_load(log: RecordedLog, wind: Floats) -> Floats:
-    """Return what a wind adds to the load of still air, shape (n, 3); `wind` is where the air goes, north and east [m/s]."""
+    """Return what a wind adds to the load of still air, shape (n, 3).
+
+    `wind` is where the air goes, north and east [m/s], shape (2,), or (2, n) where it changes.
+    """
     air, measured = air_of(log.profile), log.measurements
     c, s = measured.pointing
     ahead, aside = c * wind[0] + s * wind[1], c * wind[1] - s * wind[0]
@@ -100,7 +103,30 @@ def current_load(log: RecordedLog, current: Floats) -> Floats:
     # The body frame turns through the water.
     turning = np.column_stack([r * flow[:, 1], -r * flow[:, 0], np.zeros(len(r))])
     through, rates = measured.nu - flow, log.acceleration - turning
-    hull = log.profile.hull
+    added = _added_mass(log.profile)
+    more = damping(log, through) - damping(log, measured.nu)
+    return more + _added_load(added, through, rates) - _added_load(added, measured.nu, log.acceleration)
+
+
+def strip_load(log: RecordedLog, growth: Floats, added_share: float) -> Floats:
+    """Return what a bank adds to the forces of deep water, shape (n, 3).
+
+    Parameters
+    ----------
+    log
+        The recording.
+    growth
+        Growth of the damping, as a share, shape (n,).
+    added_share
+        Growth of the added mass over that of the damping.
+    """
+    nu = log.measurements.nu
+    more = _added_load(_added_mass(log.profile), nu, log.acceleration)
+    return np.asarray(growth[:, None] * (damping(log, nu) + added_share * more))
+
+
+def _added_mass(profile: Profile) -> Floats:
+    hull = profile.hull
     rigid = np.array(
         [
             [hull.mass_kg, 0.0, 0.0],
@@ -108,9 +134,7 @@ def current_load(log: RecordedLog, current: Floats) -> Floats:
             [0.0, hull.mass_kg * hull.x_g_m, hull.inertia_z],
         ]
     )
-    added = hull.M - rigid
-    more = damping(log, through) - damping(log, measured.nu)
-    return more + _added_load(added, through, rates) - _added_load(added, measured.nu, log.acceleration)
+    return np.asarray(hull.M - rigid)
 
 
 def _added_load(added: Floats, nu: Floats, nu_dot: Floats) -> Floats:

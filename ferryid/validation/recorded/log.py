@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ferryid.diagnose.data import read_measurements
+from ferryid.diagnose.data import read_measurements, window_lengths
+from ferryid.diagnose.inference import EstimationProblem, estimation_problem, prior_force_model, windows
 from ferryid.effects.force_model import Measurements
 from ferryid.ingest import open_log
 from ferryid.ingest.clocks import repair_all
@@ -159,6 +160,14 @@ def cached_log(path: str, profile_path: str) -> RecordedLog:
     from ferryid.vessel import load_profile
 
     return read_log(path, load_profile(profile_path))
+
+
+@cache
+def cached_problem(path: str, profile_path: str) -> EstimationProblem:
+    """Return the estimation problem of a recording as it was, with the noise that the hull alone leaves."""
+    measurements = cached_log(path, profile_path).measurements
+    found = windows(measurements, *window_lengths(measurements.profile))
+    return estimation_problem(found, *prior_force_model(found.measurements, measurements.profile))
 
 
 def usual_step_s(log: RecordedLog, topic: str) -> float:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from math import radians
+from math import degrees, radians, sqrt
 
 import numpy as np
 
+from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.validation.case import Truth
 from ferryid.validation.plant.effects.effect import Span
 from ferryid.validation.recorded.drives import drives
@@ -36,4 +37,5 @@ CONCEALMENT = Concealment(
     sample,
     conceal,
     lambda log: "" if turning(log) else "no thruster of it turns",
+    visible=lambda measurements: degrees(sqrt(12.0) * CHECKS.least_azimuth_error),
 )

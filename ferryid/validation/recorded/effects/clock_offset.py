@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from ferryid.diagnose.checks.kinematics import LATE
+from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.validation.case import Truth
 from ferryid.validation.plant.effects.effect import Span
 from ferryid.validation.recorded.effects.effect import SENSOR, Concealed, Concealment
+from ferryid.validation.recorded.kinematic_sizes import kinematic_size
 from ferryid.validation.recorded.lateness import cannot_be_late, late, possible_delay_s
 from ferryid.validation.recorded.log import RecordedLog
 
@@ -35,8 +38,9 @@ CONCEALMENT = Concealment(
     SENSOR,
     "s",
     "Positions are stamped later than heading and velocities; in one table with these, by whole rows.",
-    lambda log: (0.05, 2.0),
+    lambda log: (possible_delay_s(log, PLACE, 0.05), 2.0),
     sample,
     conceal,
     cannot,
+    visible=lambda measurements: kinematic_size(measurements, (LATE,), CHECKS.least_delay_s),
 )

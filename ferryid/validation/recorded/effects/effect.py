@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ferryid.effects.force_model import Measurements
 from ferryid.types import Flags, Floats
 from ferryid.validation.case import Truth
 from ferryid.validation.plant.effects.effect import Span
@@ -63,6 +64,14 @@ class Concealment:
         Parameters that are places, whose distance from neutral means nothing.
     time_limited
         True where it may begin within the log.
+    visible
+        ``visible(measurements)`` returns the size that an oracle sees of a sensor's error in what is measured; None where it is
+        seen in forces, as in `ferryid.validation.recorded.oracle_size`.
+    parts
+        ``parts(log, truth)`` returns the forces of the actuators, as in the measurements, that the motion is weighed
+        against; None where the altered record gives them.
+    allowed
+        Effects that come with it and may be named too.
     """
 
     id: str
@@ -76,6 +85,9 @@ class Concealment:
     neutral: float = 0.0
     positions: tuple[str, ...] = ()
     time_limited: bool = False
+    visible: Callable[[Measurements], float] | None = None
+    parts: Callable[[RecordedLog, Truth], Floats] | None = None
+    allowed: tuple[str, ...] = ()
 
 
 def acting(truth: Truth, t: Floats) -> Flags:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from math import radians
+from math import degrees, radians
 
 import numpy as np
 
+from ferryid.diagnose.checks.kinematics import ANGLE
+from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.validation.case import Truth
 from ferryid.validation.plant.effects.effect import Span, random_sign
 from ferryid.validation.recorded.effects.effect import SENSOR, Concealed, Concealment
+from ferryid.validation.recorded.kinematic_sizes import kinematic_size
 from ferryid.validation.recorded.log import RecordedLog
 
 
@@ -31,4 +34,5 @@ CONCEALMENT = Concealment(
     sample,
     conceal,
     lambda log: "" if "psi" in log.topics else "it has no heading",
+    visible=lambda measurements: degrees(kinematic_size(measurements, (ANGLE,), radians(CHECKS.least_angle_deg))),
 )

@@ -7,6 +7,7 @@ from math import ceil
 
 import numpy as np
 
+from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.validation.case import Truth
 from ferryid.validation.plant.effects.effect import Span
 from ferryid.validation.recorded.effects.effect import SENSOR, Concealed, Concealment
@@ -52,4 +53,5 @@ CONCEALMENT = Concealment(
     lambda log: (0.1, 10.0),
     sample,
     conceal,
+    visible=lambda measurements: 100.0 * CHECKS.least_held_share,
 )

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from ferryid.diagnose.checks.kinematics import X, Y
+from ferryid.diagnose.checks.lever_arm import least_m
 from ferryid.validation.case import Truth
 from ferryid.validation.plant.effects.effect import Span, random_vector
 from ferryid.validation.recorded.effects.effect import SENSOR, Concealed, Concealment, length_of
+from ferryid.validation.recorded.kinematic_sizes import kinematic_size
 from ferryid.validation.recorded.log import RecordedLog
 from ferryid.vessel.frames import to_world
 
@@ -40,4 +43,5 @@ CONCEALMENT = Concealment(
     sample,
     conceal,
     cannot,
+    visible=lambda measurements: kinematic_size(measurements, (X, Y), least_m(measurements)),
 )

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from ferryid.diagnose.checks.kinematics import SCALE
+from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.validation.case import Truth
 from ferryid.validation.plant.effects.effect import Span, random_sign
 from ferryid.validation.recorded.effects.effect import SENSOR, Concealed, Concealment
+from ferryid.validation.recorded.kinematic_sizes import kinematic_size
 from ferryid.validation.recorded.log import RecordedLog
 
 VELOCITY = ("u", "v", "vel_N", "vel_E")
@@ -38,4 +41,5 @@ CONCEALMENT = Concealment(
     conceal,
     cannot,
     neutral=1.0,
+    visible=lambda measurements: kinematic_size(measurements, (SCALE,), CHECKS.least_scale),
 )

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.validation.case import Truth
 from ferryid.validation.plant.effects.effect import Span, random_sign
 from ferryid.validation.recorded.effects.effect import SENSOR, Concealed, Concealment
+from ferryid.validation.recorded.kinematic_sizes import rate_scale_size
 from ferryid.validation.recorded.log import RecordedLog
 
 
@@ -30,4 +32,5 @@ CONCEALMENT = Concealment(
     conceal,
     lambda log: "" if {"r", "psi"} <= set(log.topics) else "it has no yaw rate beside a heading",
     neutral=1.0,
+    visible=lambda measurements: rate_scale_size(measurements, CHECKS.least_rate_scale),
 )

@@ -1,0 +1,67 @@
+"""The oracle's size in a recording: where a known change of the record is as large as it has to be, and doses by it."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from ferryid.validation.case import Truth
+from ferryid.validation.oracle import _Log
+from ferryid.validation.recorded.effects import concealments
+from ferryid.validation.recorded.kinematic_sizes import SIGMAS
+from ferryid.validation.recorded.oracle_size import Baseline, _beside_hull, _gain_of_noise, oracle_size, visibility
+from tests.validation.recorded_logs import ferry
+
+
+def test_a_shift_of_so_many_standard_deviations_is_named_19_times_in_20() -> None:
+    # One in a hundred logs without a shift is beyond the two-sided threshold.
+    threshold = float(norm.isf(0.005))
+    assert norm.sf(threshold - SIGMAS) == pytest.approx(0.95)
+
+
+def test_what_the_hull_takes_up_is_not_seen() -> None:
+    rng = np.random.default_rng(2)
+    hull = 1e3 * rng.standard_normal((200, 3))
+    own = rng.standard_normal(200)
+    across = own - hull @ np.linalg.lstsq(hull, own, rcond=None)[0]
+    assert _beside_hull(hull @ [1.0, -2.0, 0.5], hull) < 3.0
+    assert _beside_hull(own, hull) == pytest.approx(np.linalg.norm(across), rel=1e-3)
+    # A hull that is known takes up nothing.
+    assert _beside_hull(own, 0.0 * hull) == pytest.approx(np.linalg.norm(own))
+
+
+def test_noise_of_known_spectrum_gains_by_its_power() -> None:
+    white = np.random.default_rng(3).standard_normal((20000, 1))
+    # As strong as the noise on every frequency: half of ``1 - log 2`` for each row.
+    assert _gain_of_noise(white) == pytest.approx(0.5 * (1.0 - np.log(2.0)) * len(white), rel=0.1)
+
+
+@cache
+def baseline() -> list[Baseline]:
+    return [Baseline(ferry(), _Log(ferry().measurements).trial)]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("effect", ["payload", "thruster_gain", "time_delay"])
+def test_the_oracle_just_sees_its_size(effect: str) -> None:
+    one = concealments()[effect]
+
+    def truth_of(size: float) -> Truth:
+        return one.sample(size, ferry(), np.random.default_rng(4), (None, None))
+
+    size = oracle_size(one, baseline(), truth_of)
+    assert visibility(one, baseline(), truth_of(size)) == pytest.approx(1.0, abs=0.1)
+    assert visibility(one, baseline(), truth_of(2.0 * size)) == pytest.approx(2.0, abs=0.3)
+    # Twice as many such logs halve the square of what is needed.
+    twice = visibility(one, baseline() * 2, truth_of(size))
+    assert twice == pytest.approx(np.sqrt(2.0), abs=0.15)
+
+
+@pytest.mark.slow
+def test_an_error_that_nothing_shows_has_no_size() -> None:
+    # Forty-five seconds are too short for the kinematics.
+    one = concealments()["lever_arm"]
+    assert oracle_size(one, baseline(), lambda size: Truth("lever_arm", None, {"x": size, "y": 0.0})) == np.inf
