@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import ceil
+from math import ceil, log10
 
 import matplotlib as mpl
 import numpy as np
@@ -17,6 +17,8 @@ from ferryid.report.figures import STYLE
 
 WIDTH = 9.0
 BLUE, ORANGE, GREY = "#0072b2", "#d55e00", "#7f7f7f"
+LONG = 2.0
+"""Decades from which on an axis has labels at the powers of ten alone."""
 ACROSS = 4
 """Detection curves beside each other."""
 
@@ -76,8 +78,10 @@ def detection_curves(found: Sequence[Detected]) -> str:
             axes.axhline(0.95, color=GREY, linewidth=0.6)
             axes.set_xscale("log")
             axes.set_xlim(*one.limits)
-            # A panel is too small for more than the powers of ten.
-            axes.xaxis.set_major_locator(LogLocator(subs=(1.0,), numticks=6))
+            # A panel is too small for more than the powers of ten, of which a short axis may hold none.
+            decades = log10(one.limits[1] / one.limits[0])
+            steps = (1.0,) if decades > LONG else (1.0, 2.0, 5.0)
+            axes.xaxis.set_major_locator(LogLocator(subs=steps, numticks=12))
             axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
             axes.xaxis.set_minor_formatter(NullFormatter())
             axes.set_ylim(-0.08, 1.08)

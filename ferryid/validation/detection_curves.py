@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import exp, inf, isfinite, log
+from math import exp, inf, isfinite, isnan, log
 from typing import ClassVar
 
 import numpy as np
@@ -92,6 +92,12 @@ class Curve(Record):
     bound: str
     place: float
 
+    def __post_init__(self) -> None:
+        """Take what JSON has no number for as what it was: infinite."""
+        for name in ("high", "place"):
+            if isnan(getattr(self, name)):
+                object.__setattr__(self, name, inf)
+
     def share(self, sizes: Floats) -> Floats:
         """Return the share of logs in which an effect is named, by its sizes."""
         if not 0.0 < self.place < inf:
@@ -124,6 +130,12 @@ class Ratio(Record):
     value: float | None
     low: float
     high: float
+
+    def __post_init__(self) -> None:
+        """Take what JSON has no number for as what it was: infinite."""
+        for name in ("low", "high"):
+            if isnan(getattr(self, name)):
+                object.__setattr__(self, name, inf)
 
 
 @dataclass(frozen=True)

@@ -3,37 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import isfinite
 from typing import Any
 
 import numpy as np
 
 from ferryid.counts import counted
-from ferryid.report.html import template
-from ferryid.report.validation_figures import Answers, Detected, detection_curves, parameter_errors
-from ferryid.types import Floats
-from ferryid.validation.detection_curves import Curve
-from ferryid.validation.estimate_errors import WITHIN, EstimateErrors
+from ferryid.report.validation_figures import Detected, detection_curves
 from ferryid.validation.name_scores import Share
-from ferryid.validation.recorded.case_sampling import NotMade
+from ferryid.validation.page_parts import BEYOND, answers, error_figure, error_row, few, render
+from ferryid.validation.recorded.case_sampling import MULTIPLES, NotMade
+from ferryid.validation.recorded.doses import RELATIVE_STEP, Doses, joined, pooled
 from ferryid.validation.recorded.effects import ACTUATOR, LOAD, SENSOR, concealments
 from ferryid.validation.recorded.scores import DoseResponse, Later, Moved, RecordedScores, recorded_targets
 
-BEYOND = 1.3
-"""How far the axis of a detection curve goes beyond the sizes tried, as a factor."""
 FAMILIES = {SENSOR: "Sensors", ACTUATOR: "Actuators", LOAD: "Loads"}
 
 
 def figures(scores: RecordedScores) -> dict[str, str]:
     """Return the page's figures by file name, as SVG text."""
     drawn = {}
-    shown = [one for one in scores.responses if one.curve is not None and one.noticed_curve is not None]
+    shown = pooled([one.doses for one in scores.responses])
     if shown:
         drawn["detection.svg"] = detection_curves([_detected(one) for one in shown])
-    found = {one.effect: one.errors for one in scores.recoveries[1:] if one.errors}
-    if found:
-        drawn["errors.svg"] = parameter_errors(found, WITHIN)
-    return drawn
+    return drawn | error_figure(scores.recoveries)
 
 
 def page(result: Mapping[str, Any], scores: RecordedScores) -> str:
@@ -46,15 +38,11 @@ def page(result: Mapping[str, Any], scores: RecordedScores) -> str:
     scores
         Of its cases.
     """
-    known, every = concealments(), scores.recoveries[0]
+    known = concealments()
     tried = {one.effect for one in scores.responses}
     context = {
-        "result": result,
         "scores": scores,
         "cases": counted(scores.runs, "case"),
-        "seconds": [f"{one:.0f}" for one in scores.seconds],
-        "lost": [f"{result['counts'][name]} {name}" for name in ("refused", "crashed") if result["counts"][name]],
-        "targets": recorded_targets(scores),
         "families": [
             (title, [(one.id, one.how) for one in known.values() if one.family == family and one.id in tried])
             for family, title in FAMILIES.items()
@@ -75,24 +63,26 @@ def page(result: Mapping[str, Any], scores: RecordedScores) -> str:
         "moved": [_moved(one) for one in scores.moved],
         "wrong": _counts(scores.wrong_names),
         "gone": _counts(scores.gone_names),
-        "every": every,
-        "median_error": _percent(every.median_error),
-        "errors": [_errors(one) for one in scores.recoveries[1:]],
-        "noticed_errors": [_errors(one) for one in scores.noticed_recoveries[1:]],
+        "noticed_errors": [error_row(one) for one in scores.noticed_recoveries[1:]],
         "not_made": _not_made(scores),
         "by_family": _by_family(scores),
+        "multiples": [f"{one:g}" for one in MULTIPLES],
+        "by_multiple": _by_multiple(scores),
         "figures": figures(scores),
     }
-    return template("validation_recorded.md").render(context)
+    return render(
+        "validation_recorded.md", result, scores.seconds, recorded_targets(scores), scores.recoveries, context
+    )
 
 
 def _row(one: DoseResponse) -> tuple[str, ...]:
     unit = concealments()[one.effect].unit
     if one.curve is None or one.noticed_curve is None:
-        return one.effect, one.recording, unit, "", "", "", "the recording as it was has this name"
+        return one.effect, one.recording, unit, "", "", "", "", "the recording as it was has this name"
     note = ", ".join(f"{count} {what}" for what, count in one.instead.items())
     named = f"{sum(one.named)} of {len(one.named)}"
-    return one.effect, one.recording, unit, named, one.curve.text, one.noticed_curve.text, note
+    least = f"{float(np.median(one.oracle_sizes)):.3g}" if any(one.oracle_sizes) else ""
+    return one.effect, one.recording, unit, least, named, one.curve.text, one.noticed_curve.text, note
 
 
 def _later(one: Later) -> tuple[str, ...]:
@@ -108,30 +98,25 @@ def _moved(one: Moved) -> tuple[str, ...]:
     return one.effect, one.recording, one.parameter, *numbers, found
 
 
-def _detected(one: DoseResponse) -> Detected:
-    assert one.curve is not None
-    assert one.noticed_curve is not None
-    limits = (min(one.sizes) / BEYOND, max(one.sizes) * BEYOND)
-    title = f"{one.effect}\n{one.recording}"
+def _detected(one: Doses) -> Detected:
     return Detected(
-        title,
-        concealments()[one.effect].unit,
-        limits,
-        _answers(one.sizes, one.named, one.curve),
-        _answers(one.sizes, one.noticed, one.noticed_curve),
+        one.effect,
+        "multiple of the oracle's size",
+        (MULTIPLES[0] / BEYOND, MULTIPLES[-1] * RELATIVE_STEP),
+        answers(one.multiples, one.named, one.curve),
+        answers(one.multiples, one.noticed, one.noticed_curve),
     )
 
 
-def _answers(sizes: tuple[float, ...], named: tuple[bool, ...], fitted: Curve) -> Answers:
-    x: Floats = np.geomspace(fitted.least, fitted.most, 120)
-    return Answers(np.asarray(sizes), np.asarray(named, dtype=bool), x, fitted.share(x))
-
-
-def _errors(one: EstimateErrors) -> tuple[Any, ...]:
-    times = f"{one.in_time.count}/{one.in_time.of}" if one.in_time.of else ""
-    covered = f"{one.covered.count}/{one.covered.of}" if one.covered.of else ""
-    within = f"{one.within.count}/{one.within.of}" if one.within.of else ""
-    return one.effect, one.found, _percent(one.median_error), within, covered, times
+def _by_multiple(scores: RecordedScores) -> list[tuple[str, ...]]:
+    """Return for each family, each effect and all how many doses were named at each multiple of the oracle's size."""
+    known, every = concealments(), [one.doses for one in scores.responses]
+    rows = [("all", joined("all", every))]
+    for family, title in FAMILIES.items():
+        mine = [one for one in every if known[one.effect].family == family]
+        rows += [(f"*{title}*", joined(family, mine)), *((one.effect, one) for one in pooled(mine))]
+    shown = [(title, one) for title, one in rows if one.multiples]
+    return [(title, *(few(one.at(level)) for level in range(len(MULTIPLES)))) for title, one in shown]
 
 
 def _not_made(scores: RecordedScores) -> list[str]:
@@ -183,7 +168,3 @@ def _list(names: tuple[str, ...]) -> str:
 
 def _counts(names: Mapping[str, int]) -> str:
     return ", ".join(f"{count} {name}" for name, count in names.items())
-
-
-def _percent(value: float) -> str:
-    return f"{100.0 * value:.1f} %" if isfinite(value) else "none"

@@ -14,11 +14,14 @@ from ferryid.validation.detection_curves import Curve, curve
 from ferryid.validation.estimate_errors import EstimateErrors, estimate_errors
 from ferryid.validation.name_scores import HULL, Share, names, outcome_of_missed, wrong_names
 from ferryid.validation.recorded.case_sampling import NotMade
+from ferryid.validation.recorded.doses import Doses, joined
 from ferryid.validation.recorded.effects import Concealment, concealments
 from ferryid.validation.recorded.own_errors import OwnErrors
 from ferryid.validation.records import UNKNOWN, CaseResult, Key
 from ferryid.validation.targets import COVERED, FALSE, IN_TIME, Target, share_target
 
+AT_TWICE = 0.9
+"""Share of doses of twice the oracle's size that is to be named."""
 MEDIAN_ERROR = 0.05
 """Median relative error of parameters that is allowed."""
 
@@ -57,6 +60,8 @@ class DoseResponse(Record):
         True where the recording as it was has that name already: such cases enter no other figure.
     sizes, named, noticed
         Of every case: its size, whether it was named, and whether it was named or a hint that the recording had not before.
+    oracle_sizes
+        Sizes that an oracle sees of the same, all else as in the case.
     curve, noticed_curve
         Detection curves of both; None where there is no case.
     instead
@@ -72,6 +77,18 @@ class DoseResponse(Record):
     curve: Curve | None
     noticed_curve: Curve | None
     instead: Mapping[str, int]
+    oracle_sizes: tuple[float, ...] = ()
+
+    @property
+    def doses(self) -> Doses:
+        """Sizes as multiples of the oracle's; none where these are not known."""
+        known = [one for one in zip(self.sizes, self.oracle_sizes, self.named, self.noticed, strict=False) if one[1]]
+        return Doses(
+            self.effect,
+            tuple(size / least for size, least, _, _ in known),
+            tuple(named for _, _, named, _ in known),
+            tuple(noticed for _, _, _, noticed in known),
+        )
 
 
 @dataclass(frozen=True)
@@ -254,7 +271,11 @@ def recorded_targets(scores: RecordedScores) -> list[Target]:
     every = scores.recoveries[0]
     small = f"median relative error of parameters: at most {100.0 * MEDIAN_ERROR:.0f} %"
     error = every.median_error
+    twice = joined("all", (one.doses for one in scores.responses)).at_twice
     return [
+        share_target(
+            f"named rightly at twice the oracle's size: at least {100.0 * AT_TWICE:.0f} %", twice, at_least=AT_TWICE
+        ),
         share_target(
             f"cases with a name that is neither concealed nor in the recording: at most {100.0 * FALSE:.0f} %",
             scores.wrong,
@@ -319,6 +340,7 @@ def _response(effect: str, recording: str, results: Sequence[CaseResult], plain:
         curve(sizes, named) if fresh else None,
         curve(sizes, noticed) if fresh else None,
         dict(lost.most_common()),
+        tuple(one.case.oracle_size for one in fresh),
     )
 
 

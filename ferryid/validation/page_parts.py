@@ -1,0 +1,99 @@
+"""What pages of a proof have in common: detection curves over the sizes tried, rows of errors, shares and numbers as text."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from ferryid.report.html import template
+from ferryid.report.validation_figures import Answers, parameter_errors
+from ferryid.types import Floats
+from ferryid.validation.detection_curves import Curve
+from ferryid.validation.estimate_errors import WITHIN, EstimateErrors
+from ferryid.validation.name_scores import Share
+from ferryid.validation.targets import Target
+
+BEYOND = 1.3
+"""How far the axis of a detection curve goes beyond the sizes tried, as a factor."""
+POINTS = 120
+"""Of a drawn curve."""
+
+
+def render(
+    name: str,
+    result: Mapping[str, Any],
+    seconds: tuple[float, float],
+    targets: Sequence[Target],
+    recoveries: Sequence[EstimateErrors],
+    context: Mapping[str, Any],
+) -> str:
+    """Return a page as Markdown.
+
+    Parameters
+    ----------
+    name
+        Of the template.
+    result
+        Seed, commitment, counts and settings of the run.
+    seconds
+        Of the median diagnosis, and of the slowest.
+    targets
+        And whether they were reached.
+    recoveries
+        Errors of everything first, then by effect.
+    context
+        What this page has besides.
+    """
+    every = recoveries[0]
+    shared = {
+        "result": result,
+        "command": command(result),
+        "lost": [f"{result['counts'][name]} {name}" for name in ("refused", "crashed") if result["counts"][name]],
+        "seconds": tuple(f"{one:.0f}" for one in seconds),
+        "targets": targets,
+        "every": every,
+        "median_error": percent(every.median_error),
+        "errors": [error_row(one) for one in recoveries[1:]],
+        "has_errors": any(one.errors for one in recoveries[1:]),
+    }
+    return template(name).render({**shared, **context})
+
+
+def command(result: Mapping[str, Any]) -> str:
+    """Return the command that made a run."""
+    settings = result["settings"]
+    real = f" --real {settings['real']}" if "real" in settings else ""
+    vessel = f" --vessel {settings['vessel']}" if "vessel" in settings else ""
+    runs = f" --runs {settings['runs']:g}" if settings["runs"] != 1.0 else ""
+    only = f" --only {','.join(settings['only'])}" if settings["only"] else ""
+    return f"ferryid prove{real}{vessel} --seed {result['seed']}{runs}{only}"
+
+
+def error_figure(recoveries: Sequence[EstimateErrors]) -> dict[str, str]:
+    """Return the figure of parameter errors by its file name; none where nothing was named."""
+    found = {one.effect: one.errors for one in recoveries[1:] if one.errors}
+    return {"errors.svg": parameter_errors(found, WITHIN)} if found else {}
+
+
+def answers(sizes: Sequence[float], named: Sequence[bool], fitted: Curve) -> Answers:
+    """Return runs with their fitted curve, for a figure."""
+    x: Floats = np.geomspace(fitted.least, fitted.most, POINTS)
+    return Answers(np.asarray(sizes), np.asarray(named, dtype=bool), x, fitted.share(x))
+
+
+def error_row(one: EstimateErrors) -> tuple[Any, ...]:
+    """Return errors of the parameters of one effect as cells of a table."""
+    return one.effect, one.found, percent(one.median_error), few(one.within), few(one.covered), few(one.in_time)
+
+
+def few(share: Share) -> str:
+    """Return a share as its counts; empty where there is none."""
+    return f"{share.count}/{share.of}" if share.of else ""
+
+
+def percent(value: float) -> str:
+    """Return a share in per cent."""
+    return f"{100.0 * value:.1f} %" if isfinite(value) else "none"
