@@ -82,26 +82,29 @@ thesis: $(VENV)/installed
 	$(BIN)/ferryid reproduce thesis --out reports --json reports/thesis.json
 	$(BIN)/python -m tests.evidence reports/thesis.md
 
-# Injects effects into trials of an independent plant and diagnoses them blind: writes reports/proof.md and its
-# figures. SEED=N draws other cases, RUNS=N more of them. It goes on where it was interrupted.
+# Injects effects into trials of an independent plant and diagnoses them blind: writes reports/proof.json and figures, and with
+# the stored results of proof-real the page reports/proof.md. SEED=N draws other cases, RUNS=N more of them. It goes on where it
+# was interrupted.
 SEED ?= 20261223
 RUNS ?= 1
 proof: $(VENV)/installed
 	$(BIN)/ferryid prove --seed $(SEED) --runs $(RUNS) --out $(DEMO) --json $(DEMO)/proof.json
-	cp $(DEMO)/proof/proof.md reports/proof.md
 	mkdir -p reports/proof && cp $(DEMO)/proof/proof/*.svg $(DEMO)/proof/answers.json $(DEMO)/proof/seal.json \
 	  $(DEMO)/proof/lines/diagnosed.jsonl reports/proof/
 	cp $(DEMO)/proof.json reports/proof.json
-	$(BIN)/python -m tests.evidence reports/proof.md
+	$(BIN)/python -m tests.evidence reports/proof.json
+	$(BIN)/python -m tests.proof
 
-# Conceals effects in real recordings, where they are present, and diagnoses them blind: writes reports/proof-real.md and its
-# figures. SEED=N and RUNS=N as for the proof. It goes on where it was interrupted.
+# Conceals effects in real recordings, where they are present, and diagnoses them blind: writes reports/proof-real.json and
+# figures, and with the stored results of proof the page reports/proof.md. SEED=N and RUNS=N as for the proof.
 proof-real: $(VENV)/installed
-	$(BIN)/ferryid prove --real tests/real/recordings.toml --seed $(SEED) --runs $(RUNS) --processes 1 --out $(DEMO)
-	mkdir -p reports/proof-real && cp $(DEMO)/proof-real/proof-real.md reports/
+	$(BIN)/ferryid prove --real tests/real/recordings.toml --seed $(SEED) --runs $(RUNS) --processes 1 --out $(DEMO) \
+	  --json $(DEMO)/proof-real.json
+	mkdir -p reports/proof-real && cp $(DEMO)/proof-real.json reports/
 	cp $(DEMO)/proof-real/proof-real/*.svg $(DEMO)/proof-real/answers.json $(DEMO)/proof-real/seal.json \
 	  $(DEMO)/proof-real/lines/diagnosed.jsonl reports/proof-real/
-	$(BIN)/python -m tests.evidence reports/proof-real.md
+	$(BIN)/python -m tests.evidence reports/proof-real.json
+	$(BIN)/python -m tests.proof
 
 # Learns a hull in waves that nobody measured, and uses it in calm water: writes reports/waves.md.
 wavy: $(VENV)/installed

@@ -1,0 +1,1 @@
+"""The page of both proofs, from their stored results."""

@@ -1,0 +1,45 @@
+"""The page of both proofs: what a sceptic asks comes first, either half may be missing, and no effect lacks its sentence."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from ferryid.validation.plant.effects import plant_effects
+from ferryid.validation.recorded.effects import concealments
+from tests.proof.__main__ import PAGE, QUESTIONS, REAL, REPORTS, SIMULATED, WHY, joint_page, main
+
+
+def stored(name: str) -> dict[str, object]:
+    return dict(json.loads((REPORTS / name).read_text("utf-8")))
+
+
+def test_every_effect_has_a_sentence_on_why_the_two_differ() -> None:
+    assert set(WHY) == set(plant_effects()) | set(concealments())
+
+
+def test_the_first_ten_lines_answer_what_a_sceptic_asks() -> None:
+    first = joint_page(stored(SIMULATED), stored(REAL)).splitlines()[:10]
+    for question in (*QUESTIONS, "How could I check it?"):
+        (line,) = [one for one in first if f"**{question}**" in one]
+        if question in QUESTIONS:
+            assert "simulated: " in line
+            assert "real recordings: " in line
+    assert f"`{stored(SIMULATED)['sources']}`" in "".join(first)
+
+
+@pytest.mark.parametrize("name", [SIMULATED, REAL])
+def test_either_half_is_written_without_the_other(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_text((REPORTS / name).read_text("utf-8"), encoding="utf-8")
+    main(tmp_path)
+    text = (tmp_path / PAGE).read_text("utf-8")
+    assert ("real recordings: " in text) == (name == REAL)
+    assert text.count("\n# ") + text.startswith("# ") == 1
+    assert f"({name.removesuffix('.json')}/errors.svg)" in text
+
+
+def test_a_folder_without_results_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(SystemExit, match="Fix: run make proof"):
+        main(tmp_path)
