@@ -18,6 +18,7 @@ from ferryid.report import (
     diagnosis_figures,
     diagnosis_words,
     figures,
+    least_sizes,
     likeness,
     second_sources,
 )
@@ -137,6 +138,7 @@ def _one_as_text(one: Diagnosis) -> str:
             lines.append(f"{row['name']:<44}" + "".join(f"{cell:>22}" for cell in row["cells"][: len(names)]))
     hidden = [f"withheld {one_hidden.signal}: {one_hidden.says}" for one_hidden in one.withheld]
     remarks = [*hidden, *(f"note: {note}" for note in diagnosis_words.notes_of(one))]
+    remarks += [f"note: {text}"] if (text := least_sizes.line(one)) else []
     if one.likeness_of_all is None:
         remarks += [f"note: {note}" for note in likeness.notes(one.likeness, "this log")]
     remarks += [*second_sources.lines(one.sources), *second_sources.repair_lines(one)]
@@ -218,6 +220,8 @@ def _log(
             for one in diagnosis.withheld
         ],
         "notes": diagnosis_words.notes_of(diagnosis, told),
+        "least_sizes": least_sizes.rows(diagnosis),
+        "proof": least_sizes.proof(diagnosis),
         "sources": second_sources.section(diagnosis.sources),
         "repairs": second_sources.repairs(diagnosis),
         # Of a campaign that of all logs is shown; the JSON has each log's own.

@@ -152,7 +152,7 @@ SIDE_BY_SIDE = """## Side by side
 Named of all doses, and of those that an oracle, who knows everything but the size, sees with a wide margin. The oracle's sizes
 are not made alike: in a trial it estimates the effect in the log itself, in a recording its size follows from the noise.
 
-| effect | simulated: named | 19 times in 20 from | from twice the oracle's | real: named | at twice the oracle's | why they differ |
+| effect | simulated: named | 19 times in 20 from | twice the oracle's on | real: named | twice the oracle's | why they differ |
 |---|--:|--:|--:|--:|--:|---|"""
 
 

@@ -3,6 +3,7 @@
 from ferryid.diagnose.judging.confidence_rules import RULES, ConfidenceRule
 from ferryid.diagnose.judging.diagnosis import SCHEMA, Diagnosis, to_json
 from ferryid.diagnose.judging.finding import UNKNOWN, Finding
+from ferryid.diagnose.judging.least_sizes import LeastSize
 from ferryid.diagnose.judging.likeness import EffectVisibility, Likeness, Pair, likeness, likeness_as_json, separation
 from ferryid.diagnose.judging.responses import Key, Responses, candidates_of, response_columns, responses, together
 from ferryid.diagnose.judging.thresholds import JUDGING
@@ -19,6 +20,7 @@ __all__ = [
     "EffectVisibility",
     "Finding",
     "Key",
+    "LeastSize",
     "Likeness",
     "Pair",
     "Remainder",

@@ -34,6 +34,7 @@ from ferryid.diagnose.judging.free_runs import FreeRuns
 from ferryid.diagnose.judging.held_out import HeldOutEvidence, Improvement
 from ferryid.diagnose.judging.hidden_signal import compare_hidden_signals
 from ferryid.diagnose.judging.judge import JudgedLog, sensor_claims
+from ferryid.diagnose.judging.least_sizes import least_sizes
 from ferryid.diagnose.judging.likeness import likeness_of_logs
 from ferryid.diagnose.judging.locate import locate, locate_between
 from ferryid.diagnose.judging.posterior import posterior_of
@@ -226,6 +227,7 @@ def _concluded(
         if updates
         else None,
         remainder=remainder,
+        least_sizes=least_sizes(problem, kept, chances),
     )
 
 

@@ -7,8 +7,8 @@ their own uncertainty goes; what then is left of it, in units of the noise, is w
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from math import erf, sqrt
+from dataclasses import dataclass, field
+from math import erf, inf, sqrt
 
 import numpy as np
 
@@ -44,10 +44,24 @@ HULL = "hull_parameters"
 
 @dataclass(frozen=True)
 class DetectionPower:
-    """The chance, 0 to 1, that a candidate of usual size would have been found in a log."""
+    """How well a candidate would have been found in a log.
+
+    Attributes
+    ----------
+    candidate
+        The effect.
+    chance
+        That it would have been found at its usual size, 0 to 1.
+    usual
+        Parameters of usual size, of the signs that show less.
+    multiple
+        Of that size at which the chance is even; infinite where none is large enough.
+    """
 
     candidate: Candidate
     chance: float
+    usual: Floats = field(default_factory=lambda: np.empty(0))
+    multiple: float = inf
 
 
 def detection_powers(problem: EstimationProblem, kept: Fit, library: Sequence[Candidate]) -> tuple[DetectionPower, ...]:
@@ -82,7 +96,7 @@ def detection_powers(problem: EstimationProblem, kept: Fit, library: Sequence[Ca
         if candidate.key in taken or candidate.effect.id == HULL or candidate.effect.passing:
             continue
         size = np.array([one.size for one in candidate.parameters])
-        chance = 1.0
+        worst: DetectionPower | None = None
         for usual in _usual(candidate):
             there = problem.white(candidate.act(force_model, usual))
             change = there - before
@@ -99,9 +113,18 @@ def detection_powers(problem: EstimationProblem, kept: Fit, library: Sequence[Ca
             occam = float(np.linalg.slogdet(np.eye(len(size)) + information)[1])
             evidence = 0.5 * (strength - len(size) - occam)
             above = evidence - INFERENCE.prior_odds - candidate.log_alternatives
-            chance = min(chance, 0.5 * (1.0 + erf(above / sqrt(2.0 * max(strength, 1.0)))))
+            chance = 0.5 * (1.0 + erf(above / sqrt(2.0 * max(strength, 1.0))))
+            # What speaks for it grows with the square of the size, and the rest stays.
+            needed, gained = (
+                0.5 * occam + INFERENCE.prior_odds + candidate.log_alternatives,
+                0.5 * (strength - len(size)),
+            )
+            multiple = sqrt(max(needed, 0.0) / gained) if gained > 0.0 else inf
+            if worst is None or chance < worst.chance:
+                worst = DetectionPower(candidate, chance, usual, multiple)
         else:
-            made.append(DetectionPower(candidate, chance))
+            assert worst is not None
+            made.append(worst)
     return tuple(made)
 
 

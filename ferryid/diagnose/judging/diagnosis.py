@@ -14,6 +14,7 @@ from ferryid.diagnose.judging.credibility import HullChange
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.hidden_gain import HiddenGain
 from ferryid.diagnose.judging.learning import Learned
+from ferryid.diagnose.judging.least_sizes import LeastSize
 from ferryid.diagnose.judging.likeness import Likeness, likeness_as_json
 from ferryid.diagnose.judging.locate import Location, plain_location
 from ferryid.diagnose.judging.posterior import Posterior
@@ -131,6 +132,8 @@ class Diagnosis:
         Those of the notes that are about which logs of a campaign take part, and in which groups.
     latest
         False for a log of an earlier hull than the one that a model is stored of, where no common hull fits a campaign.
+    least_sizes
+        Of effects that were tested and not found: from which size on the log would have shown them.
     """
 
     log: str
@@ -159,6 +162,7 @@ class Diagnosis:
     sources: SecondSources = field(default_factory=SecondSources)
     gathered: tuple[str, ...] = ()
     latest: bool = True
+    least_sizes: tuple[LeastSize, ...] = ()
 
 
 def distinguished(diagnoses: Sequence[Diagnosis]) -> tuple[Diagnosis, ...]:
@@ -212,6 +216,7 @@ def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "left_out": [asdict(one) for one in diagnosis.left_out],
         **({} if diagnosis.likeness is None else {"likeness": likeness_as_json(diagnosis.likeness)}),
         "repairs": list(diagnosis.repairs),
+        **({"not_found": [one.to_json() for one in diagnosis.least_sizes]} if diagnosis.least_sizes else {}),
         **({"second_sources": diagnosis.sources.to_json()} if diagnosis.sources else {}),
         **({} if diagnosis.learned is None else {"learned": diagnosis.learned.to_json()}),
     }

@@ -185,3 +185,14 @@ def test_what_was_not_tested_is_told_by_title_and_once_for_a_reason() -> None:
         "Not tested: steady wind and gusts, since there are no wind areas.",
         "Not tested: thruster force, since nothing turns.",
     ]
+
+
+@pytest.mark.parametrize("strength", [0.03, 0.06, 0.2])
+def test_at_its_multiple_an_effect_has_an_even_chance(strength: float) -> None:
+    (one,) = detection_powers(linear(strength), NOTHING, [PUSH])
+    random, x = np.random.default_rng(5), np.full(ROWS, 10.0 * strength)
+    y = one.multiple * x + random.standard_normal((20000, ROWS))
+    information = float(x @ x)
+    evidence = 0.5 * (y @ x) ** 2 / (1.0 + information) - 0.5 * np.log1p(information)
+    assert np.mean(evidence > INFERENCE.prior_odds) == pytest.approx(0.5, abs=0.1)
+    assert (one.multiple > 1.0) == (one.chance < 0.5)

@@ -1,0 +1,50 @@
+"""What a log would not have shown: sizes of effects that were tested and not found, for the page and the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import inf
+
+from ferryid.counts import counted
+from ferryid.diagnose.judging import Diagnosis, LeastSize
+
+SHOWN = 5
+"""Effects on a terminal: the page and the JSON have all."""
+
+
+def rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
+    """Return a row for each effect and thruster that was tested and not found."""
+    return [{"says": one.says, "size": one.text} for one in diagnosis.least_sizes]
+
+
+def line(diagnosis: Diagnosis) -> str:
+    """Return the sizes of some effects in one line; of several thrusters the largest counts."""
+    worst: dict[str, LeastSize] = {}
+    for one in diagnosis.least_sizes:
+        known = worst.get(one.effect)
+        if known is None or _size(one) > _size(known):
+            worst[one.effect] = one
+    if not worst:
+        return ""
+    shown = [_short(one) for one in list(worst.values())[:SHOWN]]
+    more = len(worst) - len(shown)
+    rest = f" (and {counted(more, 'effect')} more in the report)" if more else ""
+    return f"would not have been seen here: {', '.join(shown)}{rest}"
+
+
+def proof(diagnosis: Diagnosis) -> str:
+    """Return the command that measures such sizes in the log itself."""
+    names: Sequence[str] = list(dict.fromkeys(one.effect for one in diagnosis.least_sizes))
+    wanted = [name for name in ("wind", "payload") if name in names] or list(names[:2])
+    return (
+        f"ferryid prove --real {diagnosis.path or diagnosis.log} --vessel {diagnosis.vessel} --only {','.join(wanted)}"
+    )
+
+
+def _short(one: LeastSize) -> str:
+    name = one.effect.replace("_", " ")
+    return f"{name} at any size" if one.value is None else f"{name} below {one.text}"
+
+
+def _size(one: LeastSize) -> float:
+    return inf if one.value is None else one.value
