@@ -25,6 +25,7 @@ from ferryid.validation.recorded.scores import RecordedScores
 from ferryid.validation.scores import Detection, Scores
 from ferryid.validation.source_hash import source_hash
 from tests.evidence import ROOT, stamp
+from tests.real import withheld
 
 REPORTS = ROOT / "reports"
 SIMULATED, REAL, PAGE = "proof.json", "proof-real.json", "proof.md"
@@ -40,12 +41,13 @@ def main(folder: Path) -> None:
     }
     if not found:
         sys.exit(f"{folder}: neither {SIMULATED} nor {REAL}. Fix: run make proof or make proof-real")
-    write_text(folder / PAGE, joint_page(found.get(SIMULATED), found.get(REAL)))
+    hidden = [] if REAL not in found else withheld.section(folder)
+    write_text(folder / PAGE, joint_page(found.get(SIMULATED), found.get(REAL), hidden))
     stamp(folder / PAGE)
 
 
-def joint_page(simulated: Result | None, real: Result | None) -> str:
-    """Return the page of two results of `ferryid prove`, either of which may be None."""
+def joint_page(simulated: Result | None, real: Result | None, hidden: Sequence[str] = ()) -> str:
+    """Return the page of two results of `ferryid prove`, either of which may be None, with the section on what was withheld."""
     halves = [
         *([] if simulated is None else [Half.of_trials(simulated)]),
         *([] if real is None else [Half.of_recordings(real)]),
@@ -59,6 +61,7 @@ def joint_page(simulated: Result | None, real: Result | None) -> str:
         "",
         SIDE_BY_SIDE,
         *_rows(halves),
+        *(["", *hidden] if hidden else []),
     ]
     for one in halves:
         lines += ["", re.sub(r"^#", "##", one.text, flags=re.MULTILINE).strip()]

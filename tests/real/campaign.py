@@ -26,7 +26,7 @@ from ferryid.types import AXES, IN_MEMORY, RunContext
 from ferryid.vessel import load_profile
 from ferryid.vessel.profile import Profile
 from tests.evidence import stamp
-from tests.real import esso, groups, instruments
+from tests.real import esso, groups, instruments, withheld
 from tests.real.places import DATA, REPORTS
 
 ENVIRONMENT = ("wind", "current", "waves", "mooring", "gusts", "shallow_water")
@@ -51,13 +51,18 @@ def write() -> None:
     began = time.monotonic()
     load = os.getloadavg()[0]
     parts = [HEAD, command()]
+    hidden = list[dict[str, Any]]()
     for kind, title in (("random", "Random runs"), ("zigzag", "Zigzags"), ("all", "All runs")):
         print(title, flush=True)
-        parts.append(section(esso.study(kind), title))
+        study = esso.study(kind)
+        hidden += withheld.winds(study, title)
+        parts.append(section(study, title))
     print("KVLCC2, VTec", flush=True)
     parts += [tank(), pool()]
     print("Groups of logs, other instruments", flush=True)
-    parts += [groups.section(), instruments.section()]
+    others = instruments.sources()
+    parts += [groups.section(), instruments.section(others)]
+    withheld.store(hidden, others, REPORTS)
     minutes = (time.monotonic() - began) / 60.0
     parts.append(
         f"\nMade in {minutes:.0f} minutes on {os.cpu_count()} processors with a load of {load:.1f} at the start.\n"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -10,8 +11,11 @@ from scipy.stats import norm
 
 from ferryid.validation.case import Truth
 from ferryid.validation.oracle import _Log
+from ferryid.validation.recorded import case_sampling
+from ferryid.validation.recorded.drives import drives
 from ferryid.validation.recorded.effects import concealments
 from ferryid.validation.recorded.kinematic_sizes import SIGMAS
+from ferryid.validation.recorded.manifest import Recording
 from ferryid.validation.recorded.oracle_size import Baseline, _beside_hull, _gain_of_noise, oracle_size, visibility
 from tests.validation.recorded_logs import ferry
 
@@ -65,3 +69,25 @@ def test_an_error_that_nothing_shows_has_no_size() -> None:
     # Forty-five seconds are too short for the kinematics.
     one = concealments()["lever_arm"]
     assert oracle_size(one, baseline(), lambda size: Truth("lever_arm", None, {"x": size, "y": 0.0})) == np.inf
+
+
+@pytest.mark.slow
+def test_two_effects_are_concealed_one_after_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(case_sampling, "baselines", lambda logs, vessel: baseline())
+    recording = Recording("ferry", ("short.bag",), "milliampere")
+    (case,) = case_sampling._of_pair(recording, [ferry()], ("thruster_gain", "time_delay"), 3, 1.0)
+    assert [one.effect for one in case.truths] == ["thruster_gain", "time_delay"]
+    assert (case.kind, case.level) == ("pair", None)
+    log = ferry()
+    for truth in case.truths:
+        log = case_sampling.concealed(log, truth, case.seed).log
+    drive = drives(ferry())[str(case.truths[0].instance)]
+    ratio = log.columns[drive.column] / np.where(
+        ferry().columns[drive.column] == 0.0, np.nan, ferry().columns[drive.column]
+    )
+    assert np.nanmax(np.abs(ratio)) > 1.05
+    late = log.series[log.topics["x"]].receive_ns - ferry().series[log.topics["x"]].receive_ns
+    assert late.min() == late.max() == round(1e9 * case.truths[1].values["seconds"])
+    # A recording that is asked for one of them alone has no pair.
+    alone = replace(recording, only=("payload",))
+    assert case_sampling._of_pair(alone, [ferry()], ("payload", "wind"), 3, 1.0) == []

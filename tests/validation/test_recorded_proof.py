@@ -216,3 +216,35 @@ def test_the_command_refuses_in_one_line(ferryid_run: Any, tmp_path: Path, given
     assert wanted in line
     assert "Fix: " in line
     assert not (tmp_path / "out").exists()
+
+
+def test_of_two_effects_either_has_its_own_outcome() -> None:
+    weak = Truth("thruster_gain", "port", {"factor": 0.8})
+    arm, hint = (
+        finding("lever_arm", {"x": 1.1, "y": 0.0}, 0.2),
+        finding("thruster_gain", {"factor": 0.8}, 0.1, "port", p=0.5),
+    )
+    both = [finding("thruster_gain", {"factor": 0.8}, 0.1, "port"), arm]
+    cases = [case((weak, ARM), found, kind="pair", level=None) for found in (both, [arm, hint], [])]
+    scores = score_recorded([plain([]), *cases], [])
+    assert [one.named for one in scores.pairs] == [(True, True), (False, True), (False, False)]
+    assert [one.noticed for one in scores.pairs] == [(True, True), (True, True), (False, False)]
+    # Right is what has both names, and neither is wrong.
+    assert (scores.right.count, scores.wrong.count) == (1, 0)
+    assert scores.responses == ()
+
+
+def test_doses_are_counted_by_the_multiple_of_the_oracles_size() -> None:
+    arm = finding("lever_arm", {"x": 1.1, "y": 0.0}, 0.2)
+    cases = [
+        case((ARM,), found, size=size, oracle_size=0.5)
+        for size, found in ((0.3, []), (1.0, [arm]), (1.3, []), (2.5, [arm]))
+    ]
+    scores = score_recorded([plain([]), *cases], [])
+    (response,) = scores.responses
+    assert response.doses.multiples == pytest.approx((0.6, 2.0, 2.6, 5.0))
+    assert (response.doses.at_twice.count, response.doses.at_twice.of) == (1, 2)
+    (target,) = [one for one in recorded_targets(scores) if "twice the oracle's size" in one.what]
+    assert target.reached is not True
+    # Doses without an oracle's size are none of these.
+    assert score_recorded([plain([]), case((ARM,), [arm])], []).responses[0].doses.multiples == ()

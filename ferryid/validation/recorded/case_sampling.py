@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import isinf
 from zlib import crc32
@@ -21,8 +21,19 @@ from ferryid.validation.recorded.log import RecordedLog, cached_log
 from ferryid.validation.recorded.manifest import Recording
 from ferryid.validation.recorded.oracle_size import baselines, oracle_size
 
-KINDS = ("clean", "single", "span")
-"""Kinds of cells: recordings as they are, one effect all along, and one that begins within the recording."""
+KINDS = ("clean", "single", "span", "pair")
+"""Kinds of cells: recordings as they are, one effect all along, one that begins within the recording, and two together."""
+PAIRS = (
+    ("thruster_gain", "heading_bias"),
+    ("thruster_gain", "lever_arm"),
+    ("thruster_lag", "time_delay"),
+    ("payload", "thruster_gain"),
+    ("wind", "payload"),
+    ("current", "mooring"),
+)
+"""Effects that are concealed together: some that look alike, and some of two families."""
+IN_PAIRS = 4.0
+"""Size of either of two, as a multiple of the oracle's: what one leaves of the other is to be seen, not its size."""
 MULTIPLES = (0.5, 1.0, 2.0, 4.0, 8.0)
 """Sizes of the detection curve, as multiples of the oracle's."""
 SPREAD = 0.5
@@ -109,6 +120,8 @@ def sample_recorded(recordings: Sequence[Recording], seed: int, runs: float, onl
             made, not_made = _of_effect(recording, logs, one, seed, runs * recording.runs, only)
             cases += made
             lacking += not_made
+        for pair in PAIRS if not only or "pair" in only else ():
+            cases += _of_pair(recording, logs, pair, seed, runs * recording.runs)
     if not cases:
         raise FerryIdError(f"--real: no recording can be used. The first: {lacking[0].why}")
     if not any(case.truths for case in cases):
@@ -171,10 +184,7 @@ def _of_effect(
             case = _drawn(recording, logs, one, kind, number, rng)
             if isinstance(case, NotMade):
                 lacking.append(case)
-                continue
-            made = [concealed(log, case.truths[0], case.seed) for log in logs]
-            worst = max(made, key=lambda each: each.missed)
-            if worst.missed > MOST_MISSED:
+            elif (worst := _worst(logs, case)).missed > MOST_MISSED:
                 text = f"{one.id} of {case.size:.3g} {one.unit} was not made in {recording.name}:"
                 text = f"{text} {100.0 * worst.missed:.0f} % of"
                 lacking.append(
@@ -183,6 +193,52 @@ def _of_effect(
             else:
                 cases.append(case)
     return cases, lacking
+
+
+def _worst(logs: Sequence[RecordedLog], case: Case) -> Concealed:
+    """Return what expresses least of a case, of its logs and its effects."""
+    made = list[Concealed]()
+    for log in logs:
+        for truth in case.truths:
+            made.append(concealed(log, truth, case.seed))
+            log = made[-1].log
+    return max(made, key=lambda one: one.missed)
+
+
+def _of_pair(
+    recording: Recording, logs: Sequence[RecordedLog], pair: tuple[str, str], seed: int, runs: float
+) -> list[Case]:
+    """Return the cases of two effects together; none where a recording cannot carry both, of which each has its own line."""
+    both = [concealments()[name] for name in pair]
+    if recording.only and not set(pair) <= set(recording.only):
+        return []
+    if any(one.cannot(log) for one in both for log in logs):
+        return []
+    cases = []
+    for number in range(max(1, round(runs))):
+        rng = np.random.default_rng([seed, _key(recording, f"{' '.join(pair)} pair"), number])
+        truths = list[Truth]()
+        for one in both:
+            truth_of = _truth_of(logs, one, rng, None)
+            size = IN_PAIRS * oracle_size(one, baselines(recording.logs, recording.vessel), truth_of)
+            if size <= one.sizes(logs[0])[1]:
+                truths.append(truth_of(size))
+        if len(truths) < len(both):
+            continue
+        case = replace(
+            _case(recording, logs, " and ".join(pair), "pair", rng, truths[0], None, IN_PAIRS), truths=tuple(truths)
+        )
+        if _worst(logs, case).missed <= MOST_MISSED:
+            cases.append(replace(case, allowed=tuple(name for one in both for name in one.allowed)))
+    return cases
+
+
+def _truth_of(
+    logs: Sequence[RecordedLog], one: Concealment, rng: np.random.Generator, begin: float | None
+) -> Callable[[float], Truth]:
+    """Return what is concealed by its size: direction, thruster and times are the same for every size."""
+    drawn = int(rng.integers(2**31))
+    return lambda size: one.sample(size, logs[0], np.random.default_rng(drawn), (begin, None))
 
 
 def _drawn(
@@ -198,12 +254,7 @@ def _drawn(
     if kind != "single":
         multiple = float(np.exp(rng.uniform(*np.log(LARGE))))
     begin = None if kind == "single" else float(rng.uniform(*LATER)) * logs[0].duration_s
-    drawn = int(rng.integers(2**31))
-
-    def truth_of(size: float) -> Truth:
-        # Direction, thruster and times are the same for every size.
-        return one.sample(size, logs[0], np.random.default_rng(drawn), (begin, None))
-
+    truth_of = _truth_of(logs, one, rng, begin)
     least = oracle_size(one, baselines(recording.logs, recording.vessel), truth_of)
     size, most = multiple * least, one.sizes(logs[0])[1]
     if size > most:

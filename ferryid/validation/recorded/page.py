@@ -14,7 +14,7 @@ from ferryid.validation.page_parts import BEYOND, answers, error_figure, error_r
 from ferryid.validation.recorded.case_sampling import MULTIPLES, NotMade
 from ferryid.validation.recorded.doses import RELATIVE_STEP, Doses, joined, pooled
 from ferryid.validation.recorded.effects import ACTUATOR, LOAD, SENSOR, concealments
-from ferryid.validation.recorded.scores import DoseResponse, Later, Moved, RecordedScores, recorded_targets
+from ferryid.validation.recorded.scores import DoseResponse, Later, Moved, Paired, RecordedScores, recorded_targets
 
 FAMILIES = {SENSOR: "Sensors", ACTUATOR: "Actuators", LOAD: "Loads"}
 
@@ -61,6 +61,7 @@ def page(result: Mapping[str, Any], scores: RecordedScores) -> str:
         "responses": [_row(one) for one in scores.responses],
         "later": [_later(one) for one in scores.later],
         "moved": [_moved(one) for one in scores.moved],
+        "pairs": [_pair(one) for one in scores.pairs],
         "wrong": _counts(scores.wrong_names),
         "gone": _counts(scores.gone_names),
         "noticed_errors": [error_row(one) for one in scores.noticed_recoveries[1:]],
@@ -90,6 +91,14 @@ def _later(one: Later) -> tuple[str, ...]:
     found = "none" if one.found_s is None else f"{one.found_s:.0f}"
     size = f"{one.size:.2g} {concealments()[one.effect].unit}"
     return one.effect, one.recording, size, f"{one.onset_s:.0f}", outcome, found
+
+
+def _pair(one: Paired) -> tuple[str, ...]:
+    outcomes = [
+        "named" if named else "a hint" if noticed else "no"
+        for named, noticed in zip(one.named, one.noticed, strict=True)
+    ]
+    return one.recording, *one.effects, *outcomes
 
 
 def _moved(one: Moved) -> tuple[str, ...]:

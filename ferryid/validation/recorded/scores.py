@@ -117,6 +117,26 @@ class Later(Record):
 
 
 @dataclass(frozen=True)
+class Paired(Record):
+    """Two effects that were concealed together.
+
+    Attributes
+    ----------
+    recording
+        Of the case.
+    effects
+        With their thrusters.
+    named, noticed
+        Of each, as in `DoseResponse`.
+    """
+
+    recording: str
+    effects: tuple[str, ...]
+    named: tuple[bool, ...]
+    noticed: tuple[bool, ...]
+
+
+@dataclass(frozen=True)
 class Moved(Record):
     """A parameter of an effect that a recording has already, as a name or a hint, before and after more of it was concealed.
 
@@ -160,7 +180,7 @@ class RecordedScores(Record):
     moved
         Parameters of effects that a recording has already.
     right
-        Share of cases whose effect is named.
+        Share of cases whose effect is named, of two both.
     wrong, wrong_names
         Share of cases with a name that is neither concealed in them nor in the recording as it was, and how often each.
     gone, gone_names
@@ -171,6 +191,8 @@ class RecordedScores(Record):
         What could not be concealed.
     seconds
         Of the median diagnosis, and of the slowest.
+    pairs
+        Of two effects together.
     """
 
     runs: int
@@ -187,6 +209,7 @@ class RecordedScores(Record):
     noticed_recoveries: tuple[EstimateErrors, ...]
     not_made: tuple[NotMade, ...]
     seconds: tuple[float, float]
+    pairs: tuple[Paired, ...] = ()
 
 
 def score_recorded(
@@ -216,7 +239,7 @@ def score_recorded(
         _responses(altered, plain),
         tuple(_later(one, plain[one.case.path]) for one in fresh if one.case.kind == "span"),
         tuple(moved for one in altered if one.case.kind == "single" for moved in _moved(one, plain[one.case.path])),
-        Share(sum(one.truths[0].key in names(one) for one in differences), len(differences)),
+        Share(sum({truth.key for truth in one.truths} <= set(names(one)) for one in differences), len(differences)),
         Share(sum(map(bool, wrong)), len(wrong)),
         Counter(label(key) for keys in wrong for key in keys),
         Share(sum(map(bool, gone)), len(gone)),
@@ -225,6 +248,7 @@ def score_recorded(
         estimate_errors([_sure(one, plain[one.case.path]) for one in differences], concealments()),
         tuple(not_made),
         (float(np.median(seconds)), max(seconds)) if seconds else (0.0, 0.0),
+        tuple(_paired(one, plain[one.case.path]) for one in fresh if one.case.kind == "pair"),
     )
 
 
@@ -233,11 +257,10 @@ def difference(result: CaseResult, plain: CaseResult, own: OwnErrors | None = No
 
     What its estimates are compared with is `expected` of what was concealed.
     """
-    known = set(names(plain))
-    kept = tuple(one for one in result.diagnosis.findings if one.key not in known or one.key == result.truths[0].key)
+    known, concealed = set(names(plain)), {truth.key for truth in result.truths}
+    kept = tuple(one for one in result.diagnosis.findings if one.key not in known or one.key in concealed)
     case = replace(result.case, allowed=(*result.case.allowed, HULL))
-    truth = result.truths[0]
-    realised = {truth.effect: expected(truth, plain, own or {})}
+    realised = {truth.effect: expected(truth, plain, own or {}) for truth in result.truths}
     return replace(result, case=case, realised=realised, diagnosis=replace(result.diagnosis, findings=kept))
 
 
@@ -295,7 +318,7 @@ def recorded_targets(scores: RecordedScores) -> list[Target]:
 
 
 def _present(result: CaseResult, plain: CaseResult) -> bool:
-    return result.truths[0].key in names(plain)
+    return any(truth.key in names(plain) for truth in result.truths)
 
 
 def _gone(result: CaseResult, plain: CaseResult) -> list[Key]:
@@ -344,19 +367,24 @@ def _response(effect: str, recording: str, results: Sequence[CaseResult], plain:
     )
 
 
-def _noticed(result: CaseResult, plain: CaseResult) -> bool:
-    """Return whether an effect is named, or a hint that the recording as it was does not have."""
-    key = result.truths[0].key
+def _paired(result: CaseResult, plain: CaseResult) -> Paired:
+    keys = [truth.key for truth in result.truths]
+    named = tuple(key in names(result) for key in keys)
+    noticed = tuple(_noticed(result, plain, key) for key in keys)
+    return Paired(result.case.path, tuple(map(label, keys)), named, noticed)
+
+
+def _noticed(result: CaseResult, plain: CaseResult, key: Key | None = None) -> bool:
+    """Return whether an effect, the first where none is given, is named, or a hint that the recording as it was lacks."""
+    key = result.truths[0].key if key is None else key
     found, before = ({one.key for one in each.diagnosis.findings} for each in (result, plain))
     return key in names(result) or key in found - before
 
 
 def _sure(result: CaseResult, plain: CaseResult) -> CaseResult:
-    """Return a case in which a new hint of its effect counts as its name."""
-    if not _noticed(result, plain):
-        return result
-    key = result.truths[0].key
-    findings = tuple(replace(one, probability=1.0) if one.key == key else one for one in result.diagnosis.findings)
+    """Return a case in which a new hint of an effect in it counts as its name."""
+    sure = {truth.key for truth in result.truths if _noticed(result, plain, truth.key)}
+    findings = tuple(replace(one, probability=1.0) if one.key in sure else one for one in result.diagnosis.findings)
     return replace(result, diagnosis=replace(result.diagnosis, findings=findings))
 
 
