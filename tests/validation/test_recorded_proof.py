@@ -248,3 +248,15 @@ def test_doses_are_counted_by_the_multiple_of_the_oracles_size() -> None:
     assert target.reached is not True
     # Doses without an oracle's size are none of these.
     assert score_recorded([plain([]), case((ARM,), [arm])], []).responses[0].doses.multiples == ()
+
+
+def test_of_a_record_that_is_wrong_altogether_nothing_may_be_named() -> None:
+    truth = Truth("mirrored_axis", None, {})
+    cases = [case((truth,), found, kind="gross", level=None) for found in ([], [finding("wind")])]
+    refused = replace(cases[0], diagnosis=Diagnosis("refused", 1.0, error="The positions are mirrored. Fix: see frame"))
+    scores = score_recorded([plain([]), *cases, refused], [])
+    assert [one.named for one in scores.gross] == [(), ("wind",), ()]
+    assert [one.noticed for one in scores.gross] == [False, False, True]
+    assert scores.gross[2].outcome.startswith("The positions are mirrored.")
+    assert (scores.wrong.count, scores.wrong.of) == (1, 3)
+    assert scores.right.of == 0

@@ -21,8 +21,9 @@ from ferryid.validation.recorded.log import RecordedLog, cached_log
 from ferryid.validation.recorded.manifest import Recording
 from ferryid.validation.recorded.oracle_size import baselines, oracle_size
 
-KINDS = ("clean", "single", "span", "pair")
-"""Kinds of cells: recordings as they are, one effect all along, one that begins within the recording, and two together."""
+KINDS = ("clean", "single", "span", "pair", "gross")
+"""Kinds of cells: recordings as they are, one effect all along, one that begins within the recording, two together, and records
+that are wrong altogether."""
 PAIRS = (
     ("thruster_gain", "heading_bias"),
     ("thruster_gain", "lever_arm"),
@@ -171,6 +172,8 @@ def _of_effect(
     only: Sequence[str],
 ) -> tuple[list[Case], list[NotMade]]:
     kinds = {"single": LEVELS * runs, "span": runs if one.time_limited and len(logs) == 1 else 0.0}
+    if one.gross:
+        kinds = {"gross": runs if len(logs) == 1 else 0.0}
     wanted = {kind: many for kind, many in kinds.items() if many and (not only or {kind, one.id} & set(only))}
     if not wanted or (recording.only and one.id not in recording.only):
         return [], []
@@ -249,6 +252,8 @@ def _drawn(
     number: int,
     rng: np.random.Generator,
 ) -> Case | NotMade:
+    if kind == "gross":
+        return _case(recording, logs, one.id, kind, rng, one.sample(0.0, logs[0], rng, (None, None)))
     level = TURNS[number % LEVELS]
     multiple = MULTIPLES[level] * float(MULTIPLES[1] / MULTIPLES[0]) ** (SPREAD * rng.uniform())
     if kind != "single":

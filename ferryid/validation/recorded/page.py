@@ -39,7 +39,7 @@ def page(result: Mapping[str, Any], scores: RecordedScores) -> str:
         Of its cases.
     """
     known = concealments()
-    tried = {one.effect for one in scores.responses}
+    tried = {one.effect for one in scores.responses} | {one.effect for one in scores.gross}
     context = {
         "scores": scores,
         "cases": counted(scores.runs, "case"),
@@ -62,6 +62,10 @@ def page(result: Mapping[str, Any], scores: RecordedScores) -> str:
         "later": [_later(one) for one in scores.later],
         "moved": [_moved(one) for one in scores.moved],
         "pairs": [_pair(one) for one in scores.pairs],
+        "gross": [
+            (one.effect, one.recording, one.outcome, ", ".join(one.named) or "none", "yes" if one.noticed else "no")
+            for one in scores.gross
+        ],
         "wrong": _counts(scores.wrong_names),
         "gone": _counts(scores.gone_names),
         "noticed_errors": [error_row(one) for one in scores.noticed_recoveries[1:]],

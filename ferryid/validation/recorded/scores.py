@@ -22,6 +22,8 @@ from ferryid.validation.targets import COVERED, FALSE, IN_TIME, Target, share_ta
 
 AT_TWICE = 0.9
 """Share of doses of twice the oracle's size that is to be named."""
+GROSS = "gross"
+"""Kind of the cases whose record is wrong altogether."""
 MEDIAN_ERROR = 0.05
 """Median relative error of parameters that is allowed."""
 
@@ -117,6 +119,29 @@ class Later(Record):
 
 
 @dataclass(frozen=True)
+class Gross(Record):
+    """A record that is wrong altogether.
+
+    Attributes
+    ----------
+    effect, recording
+        Of the case.
+    outcome
+        The verdict, or why it was refused.
+    named
+        Names that the recording as it was lacks: there ought to be none.
+    noticed
+        Whether it was refused or left unexplained.
+    """
+
+    effect: str
+    recording: str
+    outcome: str
+    named: tuple[str, ...]
+    noticed: bool
+
+
+@dataclass(frozen=True)
 class Paired(Record):
     """Two effects that were concealed together.
 
@@ -193,6 +218,8 @@ class RecordedScores(Record):
         Of the median diagnosis, and of the slowest.
     pairs
         Of two effects together.
+    gross
+        Of records that are wrong altogether; they enter `wrong` and none of the other shares.
     """
 
     runs: int
@@ -210,6 +237,7 @@ class RecordedScores(Record):
     not_made: tuple[NotMade, ...]
     seconds: tuple[float, float]
     pairs: tuple[Paired, ...] = ()
+    gross: tuple[Gross, ...] = ()
 
 
 def score_recorded(
@@ -228,9 +256,10 @@ def score_recorded(
     """
     plain = {one.case.path: one for one in results if one.case.kind == "clean"}
     altered = [one for one in results if one.case.truths]
-    fresh = [one for one in altered if not _present(one, plain[one.case.path])]
+    broken = [difference(one, plain[one.case.path]) for one in altered if one.case.kind == GROSS]
+    fresh = [one for one in altered if one.case.kind != GROSS and not _present(one, plain[one.case.path])]
     differences = [difference(one, plain[one.case.path], own or {}) for one in fresh]
-    wrong = [wrong_names(one) for one in differences]
+    wrong = [wrong_names(one) for one in (*differences, *broken)]
     gone = [_gone(one, plain[one.case.path]) for one in fresh]
     seconds = [one.diagnosis.seconds for one in results]
     return RecordedScores(
@@ -249,6 +278,7 @@ def score_recorded(
         tuple(not_made),
         (float(np.median(seconds)), max(seconds)) if seconds else (0.0, 0.0),
         tuple(_paired(one, plain[one.case.path]) for one in fresh if one.case.kind == "pair"),
+        tuple(_gross(one) for one in broken),
     )
 
 
@@ -364,6 +394,15 @@ def _response(effect: str, recording: str, results: Sequence[CaseResult], plain:
         curve(sizes, noticed) if fresh else None,
         dict(lost.most_common()),
         tuple(one.case.oracle_size for one in fresh),
+    )
+
+
+def _gross(difference_: CaseResult) -> Gross:
+    diagnosis, case = difference_.diagnosis, difference_.case
+    noticed = bool(diagnosis.error) or diagnosis.verdict in ("unexplained", "not_testable")
+    named = tuple(label(key) for key in names(difference_))
+    return Gross(
+        case.truths[0].effect, case.path, diagnosis.error or diagnosis.verdict.replace("_", " "), named, noticed
     )
 
 

@@ -72,6 +72,8 @@ class Concealment:
         against; None where the altered record gives them.
     allowed
         Effects that come with it and may be named too.
+    gross
+        True for a record that is wrong altogether: it has no size and no name, and is to be refused or left unexplained.
     """
 
     id: str
@@ -88,6 +90,7 @@ class Concealment:
     visible: Callable[[Measurements], float] | None = None
     parts: Callable[[RecordedLog, Truth], Floats] | None = None
     allowed: tuple[str, ...] = ()
+    gross: bool = False
 
 
 def acting(truth: Truth, t: Floats) -> Flags:
