@@ -253,7 +253,10 @@ def test_doses_are_counted_by_the_multiple_of_the_oracles_size() -> None:
 def test_of_a_record_that_is_wrong_altogether_nothing_may_be_named() -> None:
     truth = Truth("mirrored_axis", None, {})
     cases = [case((truth,), found, kind="gross", level=None) for found in ([], [finding("wind")])]
-    refused = replace(cases[0], diagnosis=Diagnosis("refused", 1.0, error="The positions are mirrored. Fix: see frame"))
+    refused = replace(
+        cases[0],
+        diagnosis=Diagnosis("refused", 1.0, error="/a/vessel.toml: The positions are mirrored. Fix: see frame"),
+    )
     scores = score_recorded([plain([]), *cases, refused], [])
     assert [one.named for one in scores.gross] == [(), ("wind",), ()]
     assert [one.noticed for one in scores.gross] == [False, False, True]

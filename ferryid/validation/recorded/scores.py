@@ -401,9 +401,10 @@ def _gross(difference_: CaseResult) -> Gross:
     diagnosis, case = difference_.diagnosis, difference_.case
     noticed = bool(diagnosis.error) or diagnosis.verdict in ("unexplained", "not_testable")
     named = tuple(label(key) for key in names(difference_))
-    return Gross(
-        case.truths[0].effect, case.path, diagnosis.error or diagnosis.verdict.replace("_", " "), named, noticed
-    )
+    # Where the log lay is no part of the reason.
+    where, _, reason = diagnosis.error.partition(": ")
+    outcome = (reason if "/" in where else diagnosis.error) or diagnosis.verdict.replace("_", " ")
+    return Gross(case.truths[0].effect, case.path, outcome, named, noticed)
 
 
 def _paired(result: CaseResult, plain: CaseResult) -> Paired:
