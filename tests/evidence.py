@@ -24,8 +24,6 @@ MAKERS: Mapping[str, tuple[str, ...]] = {
     "reports/campaign.md": ("tests/real",),
     "reports/demo/forces.svg": ("cli/cmd_simulate.py", "cli/cmd_fit.py"),
     "reports/plan.md": ("tests/plans",),
-    "reports/proof.md": ("cli/cmd_prove.py",),
-    "reports/proof-real.md": ("cli/cmd_prove.py",),
     "reports/proof.json": ("cli/cmd_prove.py",),
     "reports/proof-real.json": ("cli/cmd_prove.py",),
     "reports/proof.md": ("tests/proof",),
