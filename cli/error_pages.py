@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from types import TracebackType
 
+from ferryid.errors import FerryIdError
+
 PAGE = "docs/errors.md"
 PLACE, OPTION, MEMORY = "a-place-that-cannot-be-written", "an-option-or-argument", "not-enough-memory"
 _LOG, _RANGE, _VESSEL, _WHICH = "a-log", "a-range-of-time", "a-vessel-profile", "which-vessel"
@@ -40,7 +42,12 @@ SECTIONS = {
 
 
 def section(error: BaseException) -> str:
-    """Return the section of the page on errors for an error that was raised, by the last module of ferryid on its way."""
+    """Return the section of the page on errors for an error that was raised, by the last module of ferryid on its way.
+
+    One that only adds to another, such as the page on a log that was refused, is explained as the other.
+    """
+    while isinstance(error.__cause__, FerryIdError) and str(error).startswith(str(error.__cause__).rstrip(".")):
+        error = error.__cause__
     name, trace = "", error.__traceback__
     while isinstance(trace, TracebackType):
         module = trace.tb_frame.f_globals.get("__name__", "")

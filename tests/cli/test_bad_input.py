@@ -29,7 +29,7 @@ def refused(run, *parts: str) -> None:
 
 def drawn(run, out: Path) -> dict:
     """Check that a refusal names a page on its log, which is whole, and that it left nothing else; return its JSON."""
-    page = Path(run.err.strip().rpartition("What the log holds is drawn in ")[2])
+    page = Path(run.err.strip().rpartition("What the log holds is drawn in ")[2].rpartition(" (docs/errors.md#")[0])
     assert page.name == "report.html"
     assert {path.name for path in (out / "reports").iterdir()} - {"assets"} == {page.parent.name}
     assert page.read_text(encoding="utf-8").rstrip().endswith("</html>")

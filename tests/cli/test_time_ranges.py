@@ -10,7 +10,7 @@ import pytest
 
 from tests.cli.test_every_command import COMMANDS
 
-LOGLESS = ("prove", "reproduce", "simulate", "vessel")
+LOGLESS = ("doctor", "prove", "reproduce", "simulate", "vessel")
 BOAT = ("--vessel", "milliampere")
 SCALE = ("--delta", "0.4", "--sigma", "0.4", "--accept", "thesis")
 
