@@ -87,10 +87,11 @@ def _path(log: str | Path) -> str:
     """Return a single log as a path."""
     paths = _paths(log)
     if len(paths) > 1:
+        from ferryid.counts import counted
         from ferryid.errors import FerryIdError
 
         raise FerryIdError(
-            f"{log}: matches {len(paths)} logs, one was to be read. Fix: name one, the first is {paths[0]}"
+            f"{log}: matches {counted(len(paths), 'log')}, one was to be read. Fix: name one, the first is {paths[0]}"
         )
     return paths[0]
 

@@ -161,10 +161,10 @@ def _draw_once() -> None:
     kept: dict[str, Any] = {}
     drawn = fit_report.render
 
-    def render(result: Any) -> Any:
+    def render(result: Any, *more: Any) -> Any:
         key = dump_json(model_to_json(replace(result.model, created="")))
         if key not in kept:
-            kept[key] = drawn(result)
+            kept[key] = drawn(result, *more)
         return kept[key]
 
     fit_report.render = render

@@ -135,10 +135,13 @@ def test_cases_of_a_seed_are_the_same_and_each_recording_is_one(places: dict[str
         ("clean", "unaltered: again"),
         ("clean", "unaltered: long"),
         *[("single", "lever_arm: long")] * 5,
-        *[("single", "thruster_gain: long")] * 5,
         ("span", "thruster_gain: long"),
     ]
-    assert [one.name for one in drawn.cases] == [f"{number:03d}" for number in range(13)]
+    # Beside a hull that nobody knows, the only propeller's force all along is not seen.
+    whys = [one.why for one in drawn.not_made if one.effect == "thruster_gain"]
+    assert len(whys) == 5
+    assert all("an oracle sees none" in why for why in whys)
+    assert [one.name for one in drawn.cases] == [f"{number:03d}" for number in range(8)]
     least, most = concealments()["lever_arm"].sizes(tanker())
     sizes = sorted(one.size for one in drawn.cases if one.cell.startswith("lever_arm"))
     assert [int(5.0 * _share(size, least, most)) for size in sizes] == [0, 1, 2, 3, 4]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,9 +16,11 @@ from ferryid.validation.recorded import case_sampling
 from ferryid.validation.recorded.drives import drives
 from ferryid.validation.recorded.effects import concealments
 from ferryid.validation.recorded.kinematic_sizes import SIGMAS
+from ferryid.validation.recorded.log import read_log
 from ferryid.validation.recorded.manifest import Recording
 from ferryid.validation.recorded.oracle_size import Baseline, _beside_hull, _gain_of_noise, oracle_size, visibility
-from tests.validation.recorded_logs import ferry
+from ferryid.vessel import load_profile
+from tests.validation.recorded_logs import ferry, zigzag
 
 
 def test_a_shift_of_so_many_standard_deviations_is_named_19_times_in_20() -> None:
@@ -65,10 +68,12 @@ def test_the_oracle_just_sees_its_size(effect: str) -> None:
 
 
 @pytest.mark.slow
-def test_an_error_that_nothing_shows_has_no_size() -> None:
-    # Forty-five seconds are too short for the kinematics.
+def test_an_error_that_nothing_shows_has_no_size(tmp_path: Path) -> None:
+    # Twenty-five seconds are too short for the kinematics.
+    log = read_log(str(zigzag(tmp_path / "short.dat", 25.0)), load_profile("kvlcc2-model"))
+    every = [Baseline(log, _Log(log.measurements).trial)]
     one = concealments()["lever_arm"]
-    assert oracle_size(one, baseline(), lambda size: Truth("lever_arm", None, {"x": size, "y": 0.0})) == np.inf
+    assert oracle_size(one, every, lambda size: Truth("lever_arm", None, {"x": size, "y": 0.0})) == np.inf
 
 
 @pytest.mark.slow

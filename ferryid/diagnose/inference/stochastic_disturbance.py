@@ -133,8 +133,14 @@ def fit_disturbances(
         found = {state.candidate.key for state in states}
         theirs = velocities.gap(force_model)
         alone = fit_noise(velocities, theirs)
-        shown = [_shown(velocities, theirs, alone, state, force_model) for state in states]
-        states = [replace(state, gain_in_velocities=gain) for state, gain in zip(states, shown, strict=True)]
+        # What is broad is in the noise of any velocity, and shows by its power alone.
+        keys = {one.key for one in narrow}
+        states = [
+            replace(state, gain_in_velocities=_shown(velocities, theirs, alone, state, force_model))
+            if state.candidate.key in keys
+            else state
+            for state in states
+        ]
         missing = [one for one in narrow if last and one.key not in found]
         before = {one.candidate.key: one for one in initial if one.in_velocities}
         more = _selected(velocities, theirs, alone, missing, force_model, minimum_gain, before, closely=True)[1]

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 from ferryid.ingest.log import Format, Loss, TableLayout
 from ferryid.ingest.records import (
@@ -78,7 +79,8 @@ def _open(path: Path, layout: TableLayout | None) -> RecordReader:
     tables = [with_places(table, scan.places[number]) for number, table in scan.tables.items() if scan.places[number]]
     if not tables:
         raise FerryIdError(
-            f"{path}: the ULog holds no data, found {len(scan.formats)} definitions and {len(scan.subscriptions)} topics"
+            f"{path}: the ULog holds no data, found {counted(len(scan.formats), 'definition')} and "
+            f"{counted(len(scan.subscriptions), 'topic')}"
             f"{', and damage' if scan.stretches or scan.cut else ''}. Fix: copy it from the autopilot again, or record while "
             "the vessel is armed"
         )
