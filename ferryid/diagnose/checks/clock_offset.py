@@ -1,6 +1,7 @@
 """Clock offset within the navigation: positions that are later than velocities, or earlier.
 
-Which of the two is right is not for kinematics to say. Measurements are late rather than early, so the later one is moved.
+Which of the two is right is not for kinematics to say. Measurements are late rather than early, so the later one is moved;
+in a short log neither is, as a guess and an uncertain size would enter all its forces.
 """
 
 from __future__ import annotations
@@ -37,11 +38,12 @@ def find(measurements: Measurements) -> SensorFinding | None:
         moved = (_earlier(when, measured, nu) for nu in (measured.nu_raw, measured.nu))
         return replace(measured, nu_raw=next(moved), nu=next(moved), usable=usable)
 
+    says = f"{lagging} lags {leading} by {abs(late.value):.2f} s."
     return SensorFinding(
         "clock_offset",
         {"seconds": late},
-        f"{lagging} lags {leading} by {abs(late.value):.2f} s.",
-        correct,
+        f"{says} It is not corrected in so short a log." if found.short else says,
+        (lambda measured: measured) if found.short else correct,
         found.evidence(LATE),
     )
 

@@ -59,6 +59,8 @@ class Kinematics:
         Derivatives of the residual by the parameters, north and east, shape (J, 2, 7).
     left
         Residual [m/s], shape (J, 2).
+    short
+        True where the log is too short for blocks of residuals as long as those of other logs.
     """
 
     active: NDArray[np.bool_]
@@ -67,6 +69,7 @@ class Kinematics:
     middle_s: Floats
     regressors: Floats
     left: Floats
+    short: bool = False
 
     def found(self, index: int, least: float) -> bool:
         """Return whether a parameter is certainly not neutral, and by at least `least`, in both solutions alike."""
@@ -167,7 +170,8 @@ def kinematics(measurements: Measurements, forced: tuple[int, ...] = ()) -> Kine
     rival = _solve(data, p, active, own=True)
     if rival is None:
         return None
-    return Kinematics(active, solution, rival[0], data.problem.middle_s, data.derivatives(p), data.residual(p))
+    short = independence(data.problem.place)[1] > 1.0
+    return Kinematics(active, solution, rival[0], data.problem.middle_s, data.derivatives(p), data.residual(p), short)
 
 
 def _slope(values: Floats, rows: int) -> Floats:
