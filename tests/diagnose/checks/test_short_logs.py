@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ferryid.diagnose.checks import heading_bias, held_samples, lever_arm, velocity_scale, yaw_rate_scale
+from ferryid.diagnose.checks import clock_offset, heading_bias, held_samples, lever_arm, velocity_scale, yaw_rate_scale
 from ferryid.diagnose.checks.check import SensorFinding
 from ferryid.diagnose.checks.regression import independence
 from ferryid.diagnose.checks.thresholds import CHECKS
@@ -116,3 +116,16 @@ def test_a_vessel_at_rest_repeats_itself_rightly() -> None:
     assert held_samples.find(repeated(replace(measurements, nu_raw=nu), 40.0, 42.0, 3)) is None
     nu[419:422, 0] = nu[400, 0] + 0.5
     assert held_samples.find(repeated(replace(measurements, nu_raw=nu), 40.0, 42.0, 3)) is not None
+
+
+@pytest.mark.parametrize("seconds", [90.0, 400.0])
+def test_a_clock_offset_is_corrected_in_a_log_that_is_long_enough(seconds: float) -> None:
+    measured = turning(3, seconds)
+    eta = np.column_stack([np.roll(measured.eta[:, :2], 8, axis=0), measured.eta[:, 2]])
+    late = replace(measured, eta=eta, usable=np.arange(len(eta)) >= 8)
+    found = clock_offset.find(late)
+    holds(found, seconds=0.8)
+    assert found is not None
+    assert ("not corrected" in found.says) == (seconds < 100.0)
+    moved = found.correct(late)
+    assert (moved is late) == (seconds < 100.0)
