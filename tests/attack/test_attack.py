@@ -115,6 +115,7 @@ def _examined(case: Case, tmp_path: Path, fault: Any) -> Outcome:
     return examine(case, tmp_path / "case", tmp_path / "tmp", lambda path: Faulty(path, fault))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("fault", "sentence"),
     [

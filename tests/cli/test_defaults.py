@@ -101,6 +101,7 @@ def test_a_value_that_an_option_cannot_take(ferryid, log: Path) -> None:
     assert "--delta" in run.err
 
 
+@pytest.mark.slow
 def test_the_archive_finds_its_vessel(ferryid, log: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     run = ferryid("fit", "--archive", "--out", out)

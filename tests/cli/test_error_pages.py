@@ -25,6 +25,7 @@ def test_sections_are_on_the_page_and_all_of_them_are_used() -> None:
     assert {*SECTIONS.values(), PLACE, OPTION, MEMORY} == anchors()
 
 
+@pytest.mark.slow
 def test_every_part_that_raises_errors_has_a_section() -> None:
     parts = set()
     for path in [*(ROOT / "ferryid").rglob("*.py"), *(ROOT / "cli").glob("*.py")]:

@@ -96,6 +96,7 @@ def test_a_strip_that_is_crossed_often_needs_no_share_of_the_log(visits: int, wa
     assert EFFECT.single_visit(replace(measurements, eta=eta), p) == wanted
 
 
+@pytest.mark.slow
 def test_a_place_is_chosen_in_little_memory_and_the_same_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     force_model = sailed()
     p = values(south=30.0, north=60.0, west=10.0, east=30.0)

@@ -64,6 +64,7 @@ def apart(one: Exported, by: simulators.Acceleration) -> tuple[float, float]:
     return float(np.hypot(*(found - ned)[:, :2].T).max()), float(np.hypot(*np.diff(ned[:, :2], axis=0).T).sum())
 
 
+@pytest.mark.slow
 def test_gazebo_goes_where_ferryid_goes() -> None:
     one = plain_hull()
     text = formats()["gazebo"].render(one)
@@ -72,6 +73,7 @@ def test_gazebo_goes_where_ferryid_goes() -> None:
     assert formats()["gazebo"].check(one, text)["missing"] == []
 
 
+@pytest.mark.slow
 def test_gazebo_takes_learned_terms_and_a_factor_on_the_force() -> None:
     """Quadratic terms of any sign and pair, and masses that were learned beside those of the hull."""
     made = plain_hull()
@@ -91,6 +93,7 @@ def test_gazebo_takes_learned_terms_and_a_factor_on_the_force() -> None:
     assert distance < 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("form", "most"), [("gazebo", 0.01), ("px4", 0.15)])
 def test_what_a_plugin_has_no_term_for_costs_what_it_states(form: str, most: float) -> None:
     one = exported(MODELS["no basis"], SHA)

@@ -69,6 +69,7 @@ def test_the_wind_of_each_log_is_found_and_kept_out_of_the_hull() -> None:
     assert windy.log != calm.log
 
 
+@pytest.mark.slow
 def test_gusts_do_not_end_up_in_the_hull() -> None:
     data = data_of([measured(seed, seconds=480.0, jitter=0.01, noise=4.0, force=gusty) for seed in range(2)], sigma=0.8)
     assert 0.3 < data.conditions.gust_mps < 1.5

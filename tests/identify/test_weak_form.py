@@ -343,6 +343,7 @@ def test_forces_that_act_the_wrong_way_are_refused_with_their_cause(
         data_of(turned).refuse_contradictions()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("factor", "cause"), [(9.55**2, "several times too large"), (1.0 / 9.81, "several times too small")]
 )

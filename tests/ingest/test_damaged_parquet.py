@@ -187,6 +187,7 @@ def test_texts_in_structs_of_several_row_groups_are_read(tmp_path: Path) -> None
         assert series.columns[name].tolist() == ["a", "b", ""] * (N // 3)
 
 
+@pytest.mark.slow
 def test_no_byte_of_a_page_header_makes_values_missing_in_silence(tmp_path: Path) -> None:
     path = tmp_path / "log.parquet"
     content = written(path, pa.table(columns()), row_group_size=100)

@@ -261,6 +261,7 @@ def test_the_kalman_smoother_has_the_response_it_states() -> None:
     assert np.sum(smooth_run(impulse, time_rows)[0] ** 2) == pytest.approx(1 / (WINDOW_PER_TIME * time_rows), rel=0.01)
 
 
+@pytest.mark.slow
 def test_maximum_likelihood_finds_the_noise_of_a_simulated_walk() -> None:
     rng = np.random.default_rng(11)
     n, dt, noise, jerk = 40_000, 1 / RATE, np.array([0.05, 0.02, 0.003]), np.array([1e-4, 4e-4, 1e-6])

@@ -32,6 +32,7 @@ def test_the_autoregression_is_the_one_that_made_the_series() -> None:
     assert noise.scale[2] == pytest.approx(np.sqrt(np.diag(MIX.T @ MIX)), rel=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lengths", [[3000], [12] * 250, [1, 2, 3, 5, 8] * 150])
 def test_what_is_left_is_white_from_the_first_row_on(lengths: list[int]) -> None:
     gaps, runs = series(lengths)

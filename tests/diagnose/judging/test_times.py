@@ -17,6 +17,7 @@ from ferryid.effects import effects
 from ferryid.vessel import load_profile
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("evidence", "most"),
     [

@@ -120,6 +120,7 @@ def test_nothing_is_found_where_both_agree(
     assert found.share > 0.97
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate_hz", [1.0, 20.0])
 def test_a_second_position_at_a_lever_arm_that_is_late(rate_hz: float) -> None:
     found = other("position", lambda m: world(m, 2.1, 0.3), rate_hz, late_s=0.24, noise=0.02)
@@ -134,6 +135,7 @@ def test_a_second_position_at_a_lever_arm_that_is_late(rate_hz: float) -> None:
     assert "later" in found.says
 
 
+@pytest.mark.slow
 def test_noise_does_not_move_the_place_by_what_is_left_of_the_delay() -> None:
     found = other("position", lambda m: world(m, 2.1, 0.3), late_s=0.24, noise=0.05)
     x = next(one for one in found.differences if one.what == "place").parameters["x"]

@@ -62,6 +62,7 @@ def test_sea_does_not_repeat_itself():
     assert np.abs(spread[300:]).max() < 0.5  # more than 30 s later
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(st.one_of(st.floats(0.02, 0.4), st.floats(1e-6, 40)), st.sampled_from((-1.0, 1.0)))
 def test_box_functions_equal_mpmath(size, sign):
