@@ -19,6 +19,8 @@ FASTEST_TURN = 0.35
 """Yaw rate that no plan exceeds, times the root of gravity over length."""
 LEAST_ROOM = 3.0
 """Shorter side of an area, in lengths of the vessel, below which there is no room for circles."""
+MOST_ROOM = 40.0
+"""Longer side of an area, in lengths of the vessel, beyond which more room is not used."""
 GRAVITY = 9.81
 
 
@@ -58,6 +60,8 @@ def limits_of(vessel: Profile, area: tuple[float, float]) -> Limits:
         For an area without room for a circle.
     """
     length = dimensions(vessel)[0]
+    if not all(isfinite(side) and side > 0.0 for side in area):
+        raise FerryIdError(f"--area: has two sides above 0 m, found {area[0]:g}x{area[1]:g}. Fix: give them as 60x40")
     if min(area) < LEAST_ROOM * length:
         least = LEAST_ROOM * length
         raise FerryIdError(
@@ -73,7 +77,8 @@ def limits_of(vessel: Profile, area: tuple[float, float]) -> Limits:
         min(_steady(yaw, D, "N_r", "N_|r|r", "N_rrr"), FASTEST_TURN * (GRAVITY / length) ** 0.5),
     )
     acceleration = (surge / float(M[0, 0]), sway / float(M[1, 1]), yaw / float(M[2, 2]))
-    long, wide = (0.5 * (side - length) for side in sorted(area, reverse=True))
+    used = [min(side, MOST_ROOM * length) for side in sorted(area, reverse=True)]
+    long, wide = (0.5 * (side - length) for side in used)
     return Limits(speed, acceleration, long, wide)
 
 

@@ -15,6 +15,8 @@ from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS, UNITS, hull_of
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.identifiability.trial import sailing
+from ferryid.ingest import open_log
+from ferryid.ingest.hashing import content_hash
 from ferryid.models import Model
 from ferryid.planning.information import deviations, information
 from ferryid.planning.limits import Limits, limits_of
@@ -24,7 +26,9 @@ from ferryid.planning.steering import LEAD_S, Manoeuvre, manoeuvres
 from ferryid.planning.waters import Waters
 from ferryid.simulate import Scenario
 from ferryid.simulate.control.allocation import pushes_every_way
+from ferryid.simulate.scenario import check_seed
 from ferryid.types import Floats, RunContext
+from ferryid.vessel import parse_profile
 from ferryid.vessel.dimensions import dimensions
 from ferryid.vessel.profile import Profile
 
@@ -73,6 +77,7 @@ class PlanSettings:
                 f"--minutes: a plan takes {LEAST_MINUTES:g} to {MOST_MINUTES:g} minutes, found {self.minutes:g}. "
                 "Fix: give such a time"
             )
+        check_seed(self.seed)
 
 
 @dataclass(frozen=True)
@@ -184,6 +189,8 @@ class Plan:
         How many manoeuvres were tried.
     after
         Names of the logs whose information was taken in.
+    generic_hull
+        True where the profile has no hull model, so that a generic one of its dimensions was simulated.
     """
 
     vessel: Profile
@@ -195,6 +202,7 @@ class Plan:
     usual: str
     drawn: int
     after: tuple[str, ...] = ()
+    generic_hull: bool = False
 
     @property
     def ratio(self) -> float:
@@ -237,7 +245,8 @@ def plan(profile: Profile, logs: Sequence[str], settings: PlanSettings, run: Run
         make = _path if pushes_every_way(profile.actuators) else _orders
         made = make(waters, known, pairs, settings, run)
     run.progress("")
-    return replace(made, after=tuple(Path(log).name for log in logs))
+    names = tuple(Path(log).name for log in _once(logs, profile))
+    return replace(made, after=names, generic_hull=not profile.hull.has_model)
 
 
 def _path(waters: Waters, known: Sequence[Responses], pairs: Pairs, settings: PlanSettings, run: RunContext) -> Plan:
@@ -300,7 +309,9 @@ def _orders(waters: Waters, known: Sequence[Responses], pairs: Pairs, settings: 
             side > room for side, room in zip(sides, sorted(settings.area), strict=True)
         ):
             continue
-        drawn.append(one)
+        order = scenario.manoeuvre.speed_rpm
+        unit = "N" if waters.vessel.actuators[0].kind == "force" else "rpm"
+        drawn.append(replace(one, says=f"{one.says} at {order:.3g} {unit}"))
         parts.append(told)
         scenarios.append(scenario)
     if not drawn:
@@ -332,8 +343,18 @@ def _orders(waters: Waters, known: Sequence[Responses], pairs: Pairs, settings: 
 
 def _believed(profile: Profile, model: Model | None) -> Profile:
     """Return a profile with the hull of a model, where one is given that has its own."""
-    if model is None or not model.hull:
+    if model is None:
         return profile
+    own = parse_profile(model.profile_text, model.name).name
+    if own != profile.name:
+        raise FerryIdError(
+            f"--model: {model.label} is a model of {own}, and the plan is for {profile.name}. Fix: give a model of that vessel"
+        )
+    if not model.hull:
+        raise FerryIdError(
+            f"--model: {model.label} brings no hull of its own, as fits correct the profile's. Fix: give a model that "
+            "ferryid diagnose stored, or leave --model out"
+        )
     M, D = profile.hull.M.copy(), dict(profile.hull.D)
     places = {"m11": (0, 0), "m22": (1, 1), "m23": (1, 2), "m32": (2, 1), "m33": (2, 2)}
     for name, one in model.hull.items():
@@ -349,7 +370,7 @@ def _recorded(
 ) -> tuple[list[Responses], list[tuple[Key, Key]]]:
     """Return what logs tell already, and the pairs of effects to separate."""
     known = []
-    for log in logs:
+    for log in _once(logs, profile):
         run.progress(f"reading {Path(log).name}")
         known += information(log, profile, None, run=run)
     unresolved = [one for one in likeness(together(known)).alike if not one.resolved] if known else []
@@ -359,6 +380,14 @@ def _recorded(
         pairs += [] if (keys[0], keys[1]) in pairs else [(keys[0], keys[1])]
     kept = {key for pair in pairs for key in pair}
     return [_only(one, kept) for one in known], pairs
+
+
+def _once(logs: Sequence[str], profile: Profile) -> list[str]:
+    """Return logs without further copies of one."""
+    found = dict[str, str]()
+    for log in logs:
+        found.setdefault(content_hash(open_log(log, profile.table).paths), log)
+    return list(found.values())
 
 
 def _key(name: str, profile: Profile) -> Key:

@@ -33,6 +33,7 @@ def as_json(plan: Plan) -> dict[str, Any]:
             }
             for one in plan.chosen
         ],
+        "generic_hull": plan.generic_hull,
         "usual": plan.usual,
         "ratio": plan.ratio if isfinite(plan.ratio) else None,
         "coefficients": [
@@ -91,11 +92,15 @@ def as_text(plan: Plan) -> str:
 
 def summary(plan: Plan) -> str:
     """Return what the plan is expected to gain, in a sentence."""
+    worse = "" if plan.ratio < 1.0 else " The usual trial shows more in this time: record that, or give more --minutes."
+    generic = (
+        " The profile has no hull model: a generic one of its dimensions was simulated." if plan.generic_hull else ""
+    )
     already = f", beside {counted(len(plan.after), 'log')} recorded already" if plan.after else ""
     return (
         f"Expected standard deviations of the hull's coefficients: {plan.ratio:.2f} of those after {plan.usual}, "
         f"in the median of {len(plan.hull)}{already}. They are for the noise of the simulator's sensors: "
-        "they compare trials, and a recording will show larger ones."
+        f"they compare trials, and a recording will show larger ones.{worse}{generic}"
     )
 
 

@@ -50,8 +50,7 @@ def manoeuvres(time: float) -> list[Manoeuvre]:
     """Return all manoeuvres, with times by a factor from those of a vessel of 5 m."""
 
     def made(kind: str, share: float, helm: float, heading: float, says: str) -> Manoeuvre:
-        order = f"at {share:g} of the usual order"
-        return Manoeuvre(kind, share, helm, heading, LEAD_S * time, HOLD_S * time, LASTS_S * time, f"{says} {order}")
+        return Manoeuvre(kind, share, helm, heading, LEAD_S * time, HOLD_S * time, LASTS_S * time, says)
 
     found = []
     for share in SHARES:

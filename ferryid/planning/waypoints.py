@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from math import cos, degrees, hypot, radians
+from math import cos, degrees, hypot, isfinite, radians
 from pathlib import Path
 from typing import Any
 
@@ -68,7 +68,7 @@ def write_plan(
     texts = {CSV: as_csv(plan, radians(bearing_deg)), PICTURE: picture, **scenarios(plan)}
     if origin is not None and plan.track is not None:
         texts[MISSION] = json.dumps(mission(plan.track, radians(bearing_deg), origin), indent=1) + "\n"
-    check_place(folder, origin, overwrite=overwrite)
+    check_place(folder, origin, bearing_deg=bearing_deg, overwrite=overwrite)
     for name in FILES:
         (folder / name).unlink(missing_ok=True)
     for old in folder.glob("plan-*.toml"):
@@ -85,7 +85,17 @@ def write_plan(
     return told
 
 
-def check_place(folder: Path, origin: tuple[float, float] | None, *, overwrite: bool) -> None:
+def _is_plan(file: Path) -> bool:
+    """Tell whether a file is the JSON of a plan."""
+    try:
+        return str(json.loads(file.read_text(encoding="utf-8"))["schema"]).startswith("ferryid.plan/")
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
+
+
+def check_place(
+    folder: Path, origin: tuple[float, float] | None, *, bearing_deg: float = 0.0, overwrite: bool = False
+) -> None:
     """Refuse places that are none, and a folder whose plan is not to be replaced.
 
     Raises
@@ -98,9 +108,15 @@ def check_place(folder: Path, origin: tuple[float, float] | None, *, overwrite: 
             f"--origin: latitude is -85 to 85 and longitude -180 to 180 deg, found {origin[0]:g},{origin[1]:g}. "
             "Fix: give the middle of the area as LATITUDE,LONGITUDE"
         )
+    if not isfinite(bearing_deg) or abs(bearing_deg) > 360.0:
+        raise FerryIdError(f"--bearing: is -360 to 360 deg, found {bearing_deg:g}. Fix: give such an angle")
     there = [folder / name for name in FILES if (folder / name).exists()]
     if there and not overwrite:
         raise taken(there[0])
+    if there and not _is_plan(folder / JSON):
+        raise FerryIdError(
+            f"{there[0]}: cannot be replaced, found no plan beside it. Fix: give another folder with --out"
+        )
 
 
 def turned(poses: Floats, angle: float) -> Floats:
@@ -111,6 +127,8 @@ def turned(poses: Floats, angle: float) -> Floats:
 
 def scenarios(plan: Plan) -> dict[str, str]:
     """Return scenarios for the simulator by file: one of a path, its longer side to the north, or one a manoeuvre."""
+    if plan.generic_hull:
+        return {}  # the simulator would not know the hull
     if plan.track is not None:
         return {SCENARIO: plan.track.scenario.text}
     made = [one.scenario for one in plan.chosen if one.scenario is not None]
@@ -121,15 +139,16 @@ def as_csv(plan: Plan, bearing: float = 0.0) -> str:
     """Return poses as a row every step, or the orders of manoeuvres as a row each.
 
     A path has time [s], north, east [m], heading [deg, 0 to 360] and number of the manoeuvre; orders have begin and end [s],
-    kind, order over the usual one, helm and the change of heading that reverses it [deg].
+    kind, order to the actuators [rpm or N], helm and, of a zigzag, the change of heading that reverses it [deg].
     """
     if plan.track is None:
-        lines = ["begin_s,end_s,kind,order,helm_deg,heading_deg"]
+        lines = ["begin_s,end_s,kind,order_rpm_or_N,helm_deg,heading_deg"]
         for one in plan.chosen:
-            if one.orders is not None:
-                asked = one.orders
+            if one.orders is not None and one.scenario is not None:
+                asked, order = one.orders, one.scenario.manoeuvre.speed_rpm
+                swing = f"{asked.heading_deg:g}" if asked.kind == "zigzag" else ""
                 times = f"{one.begin_s:.1f},{one.end_s:.1f}"
-                lines.append(f"{times},{asked.kind},{asked.share:g},{asked.helm_deg:g},{asked.heading_deg:g}")
+                lines.append(f"{times},{asked.kind},{order:.4g},{asked.helm_deg:g},{swing}")
         return "\n".join(lines) + "\n"
     begins = np.array([one.begin_s for one in plan.chosen])
     lines = ["time_s,north_m,east_m,heading_deg,manoeuvre"]

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from ferryid.errors import FerryIdError
 from ferryid.planning import PlanSettings, as_json, as_text, check_place, plan, write_plan
 from ferryid.report.outcome import Outcome
 from ferryid.report.plan_figures import picture
+from ferryid.simulate.control.allocation import pushes_every_way
 from ferryid.types import RunContext
 from ferryid.vessel.profile import Profile
 
@@ -32,7 +34,11 @@ def plan_and_report(
         As of `ferryid.planning.waypoints.write_plan`.
     """
     folder = Path(run.out) / "plans" / profile.name
-    check_place(folder, origin, overwrite=overwrite)
+    check_place(folder, origin, bearing_deg=bearing_deg, overwrite=overwrite)
+    if (origin is not None or bearing_deg) and not pushes_every_way(profile.actuators):
+        raise FerryIdError(
+            f"--origin, --bearing: {profile.name} steers and gets orders, not a path on a chart. Fix: leave them out"
+        )
     found = plan(profile, logs, settings, run)
     run.progress("writing the plan")
     told = write_plan(

@@ -199,6 +199,11 @@ def _trends(result: Result) -> Iterable[Row]:
             yield {**of, **point}
 
 
+def _planned(result: Result) -> Iterable[Row]:
+    for one in result["coefficients"]:
+        yield {name: value for name, value in one.items() if name != "deviation"} | one["deviation"]
+
+
 TABLES: Mapping[str, Mapping[str, Rows]] = {
     "ferryid.fit": {
         "scores": lambda result: _scores(result["scores"]),
@@ -234,6 +239,7 @@ TABLES: Mapping[str, Mapping[str, Rows]] = {
         "trends": _trends,
         "changes": _plain("changes"),
     },
+    "ferryid.plan": {"coefficients": _planned, "manoeuvres": _plain("manoeuvres")},
     "ferryid.models": {"models": _plain("models")},
 }
 """Rows of tables by the form of a result, and by the names of the tables."""

@@ -56,7 +56,10 @@ def test_orders_for_a_vessel_that_steers(ferryid: Command, tmp_path: Path) -> No
     found = conforms(run.out)
     assert found["path"] is None
     assert [one["kind"] for one in found["manoeuvres"]]
-    assert len(list((tmp_path / "plans" / "vtec-usv").glob("plan-*.toml"))) == len(found["manoeuvres"])
+    assert all(one["says"].endswith((" rpm", " N")) for one in found["manoeuvres"])
+    # The simulator would not know the hull.
+    assert found["generic_hull"]
+    assert not list((tmp_path / "plans" / "vtec-usv").glob("*.toml"))
     refused(
         ferryid("plan", "--vessel", "vtec-usv", "--area", "2x1", "--out", tmp_path / "b"),
         "--area: 2x1 m has no room for any manoeuvre of vtec-usv",
@@ -71,6 +74,11 @@ def test_orders_for_a_vessel_that_steers(ferryid: Command, tmp_path: Path) -> No
         (("--vessel", "milliampere", "--area", "8x60"), ("no room for the turning circle", "15x15")),
         (("--vessel", "milliampere", "--minutes", "0.5"), ("--minutes: a plan takes 2 to 120 minutes, found 0.5",)),
         (("--vessel", "milliampere", "--minutes", "nan"), ("--minutes",)),
+        (("--vessel", "milliampere", "--area", "nanxinf"), ("--area: has two sides above 0 m",)),
+        (("--vessel", "milliampere", "--area", "0x0"), ("--area: has two sides above 0 m",)),
+        (("--vessel", "milliampere", "--bearing", "inf"), ("--bearing: is -360 to 360 deg",)),
+        (("--vessel", "milliampere", "--seed", "-1"), ("--seed: must be a whole number",)),
+        (("--vessel", "vtec-usv", "--origin", "60,10"), ("vtec-usv steers and gets orders",)),
         (("--vessel", "milliampere", "--origin", "63"), ("--origin: is two numbers",)),
         (("--vessel", "milliampere", "--separate", "wind"), ("--separate: is two different effects",)),
         (("--vessel", "milliampere", "--separate", "wnd,current"), ('no effect "wnd"', 'Did you mean "wind"')),

@@ -14,7 +14,7 @@ from ferryid.errors import FerryIdError
 from ferryid.planning.limits import Limits
 from ferryid.planning.plan import Chosen, Expected, Plan, Track
 from ferryid.planning.steering import manoeuvres
-from ferryid.planning.waypoints import NAV_WAYPOINT, as_csv, check_place, legs, mission, turned, write_plan
+from ferryid.planning.waypoints import NAV_WAYPOINT, as_csv, check_place, legs, mission, scenarios, turned, write_plan
 from ferryid.simulate import parse_scenario
 from ferryid.vessel import load_profile
 
@@ -43,7 +43,7 @@ def test_rows_have_the_time_and_the_manoeuvre() -> None:
     assert rows[0] == "time_s,north_m,east_m,heading_deg,manoeuvre"
     assert rows[1:] == ["0.00,0.000,0.000,0.00,0", "2.00,5.000,0.000,0.00,1", "4.00,10.000,0.000,0.00,1",
                         "6.00,10.000,5.000,90.00,2", "8.00,10.000,10.000,90.00,2"]  # fmt: skip
-    assert as_csv(steered()).splitlines()[1] == "0.0,150.0,zigzag,0.5,10,10"
+    assert as_csv(steered()).splitlines()[1] == "0.0,150.0,zigzag,500,10,10"
 
 
 def test_a_bearing_turns_the_path_clockwise() -> None:
@@ -87,9 +87,9 @@ def test_files_are_written_whole_and_not_replaced_unasked(tmp_path: Path) -> Non
     assert sorted(Path(one).name for one in told["files"]) == names
     assert json.loads((tmp_path / "p" / "plan.json").read_text())["origin_deg"] == [60.0, 10.0]
     with pytest.raises(FerryIdError, match="--overwrite"):
-        check_place(tmp_path / "p", None, overwrite=False)
+        check_place(tmp_path / "p", None)
     # A plan of another kind leaves nothing of the one before.
-    write_plan(steered(), tmp_path / "p", {}, "<svg/>", overwrite=True)
+    write_plan(steered(), tmp_path / "p", {"schema": "ferryid.plan/1"}, "<svg/>", overwrite=True)
     assert sorted(path.name for path in (tmp_path / "p").iterdir()) == [
         "plan-1.toml",
         "plan.csv",
@@ -100,4 +100,21 @@ def test_files_are_written_whole_and_not_replaced_unasked(tmp_path: Path) -> Non
 
 def test_a_place_that_is_none(tmp_path: Path) -> None:
     with pytest.raises(FerryIdError, match=r"--origin: latitude is -85 to 85 .* found 90,10"):
-        check_place(tmp_path, (90.0, 10.0), overwrite=False)
+        check_place(tmp_path, (90.0, 10.0))
+
+
+@pytest.mark.parametrize("bearing", [np.nan, np.inf, 1e300])
+def test_a_bearing_that_is_none(tmp_path: Path, bearing: float) -> None:
+    with pytest.raises(FerryIdError, match="--bearing: is -360 to 360 deg"):
+        check_place(tmp_path, None, bearing_deg=bearing)
+
+
+def test_what_is_no_plan_is_not_replaced(tmp_path: Path) -> None:
+    (tmp_path / "plan.toml").write_text("mine")
+    with pytest.raises(FerryIdError, match=r"plan\.toml: cannot be replaced, found no plan beside it"):
+        check_place(tmp_path, None, overwrite=True)
+
+
+def test_a_generic_hull_leaves_no_scenario() -> None:
+    assert scenarios(a_plan())
+    assert scenarios(replace(a_plan(), generic_hull=True)) == {}
