@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ferryid.export.exported import Exported
 from ferryid.export.names import legal, number, plain
+from ferryid.export.words import wrapped
 from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Actuator, Hull
 from ferryid.vessel.thrusters import FRESH_WATER
@@ -209,3 +211,28 @@ def left_out(one: Exported) -> list[str]:
     if one.needs_wind or one.needs_current:
         missing.append("terms of wind and current: only what still air and water make of them is in")
     return missing
+
+
+def error_report(checked: Mapping[str, Any], inertia: str, fitted: str, more: Iterable[str]) -> Iterator[str]:
+    """Yield the lines of a head on the error by a plugin's own equations.
+
+    Parameters
+    ----------
+    checked
+        As the format's own check returns it.
+    inertia, fitted
+        Which part of the inertia is wrong, and which terms were fitted to what has none.
+    more
+        Further sentences.
+    """
+    error = checked["error_share"]
+    yield ""
+    yield "Error of the force by the plugin's own equations, over the ranges above:"
+    yield f"  at constant velocity: {shares(error['velocity'])}"
+    yield f"  of the {inertia}: {shares(error['acceleration'])}"
+    if checked["missing"]:
+        yield f"What the plugin has no term for, as a share of the force before {fitted} were fitted to it:"
+    for part in checked["missing"]:
+        yield from wrapped(f"  {part['what']}: {shares(part['share'])}")
+    for sentence in more:
+        yield from wrapped(f"  {sentence}")

@@ -25,6 +25,7 @@ from ferryid.export.sdf import (
     box,
     box_lines,
     comment,
+    error_report,
     inertial,
     inertial_lines,
     left_out,
@@ -32,7 +33,6 @@ from ferryid.export.sdf import (
     numbers,
     part_lines,
     rigid_body,
-    shares,
 )
 from ferryid.export.simulator_fit import Slots, mass_share, remaining, simulator_fit
 from ferryid.export.words import beside, frames, heading, limits, wrapped
@@ -262,17 +262,7 @@ def _how_to_use(one: Exported) -> Iterator[str]:
 
 def _report(one: Exported, body: str) -> Iterator[str]:
     checked = check(one, f"<sdf>{body}</sdf>")
-    error = checked["error_share"]
-    yield ""
-    yield "Error of the force by the plugin's own equations, over the ranges above:"
-    yield f"  at constant velocity: {shares(error['velocity'])}"
-    yield f"  of the inertia (its asymmetric part): {shares(error['acceleration'])}"
-    if checked["missing"]:
-        yield "What the plugin has no term for, as a share of the force before other terms were fitted to it:"
-    for part in checked["missing"]:
-        yield from wrapped(f"  {part['what']}: {shares(part['share'])}")
-    for sentence in (*left_out(one), *_of_thrusters(one)):
-        yield from wrapped(f"  {sentence}")
+    return error_report(checked, "inertia (its asymmetric part)", "other terms", [*left_out(one), *_of_thrusters(one)])
 
 
 def _of_thrusters(one: Exported) -> Iterator[str]:

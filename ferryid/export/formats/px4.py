@@ -28,12 +28,12 @@ from ferryid.export.sdf import (
     box,
     box_lines,
     comment,
+    error_report,
     inertial,
     inertial_lines,
     left_out,
     numbers,
     rigid_body,
-    shares,
 )
 from ferryid.export.simulator_fit import Slots, mass_share, remaining, simulator_fit
 from ferryid.export.words import beside, frames, heading, limits, wrapped
@@ -171,17 +171,7 @@ def _how_to_use() -> Iterator[str]:
 
 def _report(one: Exported, body: str) -> Iterator[str]:
     checked = check(one, f"<sdf>{body}</sdf>")
-    error = checked["error_share"]
-    yield ""
-    yield "Error of the force by the plugin's own equations, over the ranges above:"
-    yield f"  at constant velocity: {shares(error['velocity'])}"
-    yield f"  of the inertia: {shares(error['acceleration'])}"
-    if checked["missing"]:
-        yield "What the plugin has no term for, as a share of the force before its terms were fitted to it:"
-    for part in checked["missing"]:
-        yield from wrapped(f"  {part['what']}: {shares(part['share'])}")
-    for sentence in (*left_out(one), *_unstable(one)):
-        yield from wrapped(f"  {sentence}")
+    return error_report(checked, "inertia", "its terms", [*left_out(one), *_unstable(one)])
 
 
 def _unstable(one: Exported) -> Iterator[str]:
