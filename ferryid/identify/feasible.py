@@ -2,12 +2,13 @@
 
 The gains of the weak form (`ferryid.identify.weak_rows`) are moved as little as their information allows to where the mass
 matrix is symmetric and lies between bounds of the rigid body's, and the damping dissipates in surge alone and in sway and yaw
-together, at every speed.
+together, at every speed. Before that the Coriolis force is tied to the mass: what products of surge with sway and yaw rate
+exert beyond it is lift, of which the prior says how large it may be.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,7 @@ from scipy.special import chdtri
 
 from ferryid.identify.inertia import rigid_body, without_sway_coupling
 from ferryid.identify.thresholds import IDENTIFY
+from ferryid.identify.weak_rows import to_force
 from ferryid.models.forces import ACCELERATIONS, effective_mass, motion_force
 from ferryid.regression.bases import Basis
 from ferryid.types import AXES, Flags, Floats
@@ -24,6 +26,41 @@ _ROUNDS = 6
 _SHARES = (0.01, 0.05, *(tenth / 10.0 for tenth in range(1, 11)), 2.0, 5.0, 100.0)
 """Of the velocities visited and a margin. At the last ones the highest power decides: a hull dissipates at every speed."""
 _DIRECTIONS = 16
+_TIE_STEPS = 3
+
+
+@dataclass(frozen=True)
+class LiftTie:
+    """A coefficient of the force that the mass matrix determines but for the hull's lift.
+
+    Attributes
+    ----------
+    term, axis
+        Number of the function, and the axis it acts on.
+    masses
+        What of the added mass it is the sum of: (row, column, factor) each.
+    spread
+        Standard deviation of the lift.
+    """
+
+    term: int
+    axis: int
+    masses: tuple[tuple[int, int, float], ...]
+    spread: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Pull:
+    """Moves gains, flat, to where they agree with the ties as far as these are sure: ``b + gain @ (level - slope @ b)``."""
+
+    gain: Floats
+    slope: Floats
+    level: Floats
+    spread: Floats
+
+    def of(self, flat: Floats, lift: Floats) -> Floats:
+        """Return the gains (..., size) pulled to a lift, (..., ties)."""
+        return np.asarray(flat + (self.level + lift - flat @ self.slope.T) @ self.gain.T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +79,8 @@ class Feasible:
         By how much the bounds moved the gains, flat.
     places
         Which gains the flat ones are, as (function, axis) rows.
+    pull
+        What ties the Coriolis force to the mass.
     """
 
     gains: Floats
@@ -49,17 +88,20 @@ class Feasible:
     projection: tuple[Floats, Floats, Floats]
     shift: Floats
     places: tuple[tuple[int, int], ...]
+    pull: _Pull
 
-    def moved(self, gains: Floats) -> Floats:
+    def moved(self, gains: Floats, seed: int = 0) -> Floats:
         """Return drawn gains, shape (n, K, 3), with a symmetric mass matrix and moved as far as the estimate was.
 
-        A bound that the estimate meets does not take the scatter of the draws: how far the truth is inside is not known.
+        Lift is drawn from its prior. A bound that the estimate meets does not take the scatter of the draws: how far the truth
+        is inside is not known.
         """
-        lift, normal, level = self.projection
+        spread, normal, level = self.projection
         rows, axes = (np.array(part) for part in zip(*self.places, strict=True))
-        flat = gains[:, rows, axes]
+        lift = self.pull.spread * np.random.default_rng(seed).standard_normal((len(gains), len(self.pull.spread)))
+        flat = self.pull.of(gains[:, rows, axes], lift)
         out = gains.copy()
-        out[:, rows, axes] = flat + (level - flat @ normal.T) @ lift.T + self.shift
+        out[:, rows, axes] = flat + (level - flat @ normal.T) @ spread.T + self.shift
         return out
 
 
@@ -72,6 +114,7 @@ def feasible_gains(
     information: Floats,
     nu: Floats,
     *,
+    ties: Sequence[LiftTie] = (),
     reduced: bool = False,
 ) -> Feasible:
     """Return the gains nearest to `gains` that physics allows.
@@ -88,11 +131,13 @@ def feasible_gains(
         What moving them costs, shape (3, K, K).
     nu
         Velocities visited, shape (n, 3).
+    ties
+        What ties the Coriolis force to the mass.
     reduced
         Whether the gains are those of a hull that cannot sway.
     """
     problem = _Problem(profile, scale, functions, mask, information, reduced)
-    wanted = problem.flat(gains)
+    wanted, pull = problem.tied(problem.flat(gains), ties)
     cuts: list[tuple[Floats, float, str]] = []
     symmetry = problem.symmetry()
     points = _points(nu)
@@ -116,7 +161,7 @@ def feasible_gains(
     # What scatter alone may bring to a bound is no contradiction.
     contradicted = bool(bounds) and float(shift @ problem.cost @ shift) > chdtri(len(bounds), IDENTIFY.bound_level)
     told = tuple(dict.fromkeys(bounds)) if contradicted else ()
-    return Feasible(problem.gains(current), told, (lift, normal, level), shift, tuple(problem.places))
+    return Feasible(problem.gains(current), told, (lift, normal, level), shift, tuple(problem.places), pull)
 
 
 class _Problem:
@@ -166,6 +211,36 @@ class _Problem:
 
     def mass(self, flat: Floats) -> Floats:
         return np.asarray(np.linalg.solve(self.G(flat), self.mass0))
+
+    def tied(self, wanted: Floats, ties: Sequence[LiftTie]) -> tuple[Floats, _Pull]:
+        """Return the gains with the ties as observations beside the data, whose cost then has these in it, and how.
+
+        Gauss-Newton steps: the added mass is not linear in the gains.
+        """
+        ties = [one for one in ties if (one.term, one.axis) in self.index and np.isfinite(one.spread)]
+        spread, found, pull, cost = np.array([one.spread for one in ties]), wanted, None, self.cost
+        for _ in range(_TIE_STEPS):
+            lift, slope = self._lift(found, ties)
+            level = slope @ found - lift
+            weighted = slope.T / spread**2
+            self.cost = cost + weighted @ slope
+            gain = np.linalg.pinv(self.cost, hermitian=True) @ weighted
+            pull = _Pull(gain, slope, level, spread)
+            found = pull.of(wanted, np.zeros(len(ties)))
+        assert pull is not None
+        return found, pull
+
+    def _lift(self, flat: Floats, ties: Sequence[LiftTie]) -> tuple[Floats, Floats]:
+        """Return what tied coefficients have beyond the mass's share, (ties,), and its slope over the gains."""
+        step = 1e-6 * np.eye(len(flat))
+        every = np.array([self.gains(one) for one in (flat, *(flat + step), *(flat - step))])
+        theta, _ = to_force(every, np.zeros((len(every), 3)), self.functions.terms, self.mass0)
+        added = np.array([self.mass(self.flat(one)) - self.mass0 for one in every])
+        lift = np.zeros((len(every), len(ties)))
+        for number, one in enumerate(ties):
+            own = sum((factor * added[:, row, column] for row, column, factor in one.masses), np.zeros(len(every)))
+            lift[:, number] = theta[:, one.term, one.axis] - own
+        return lift[0], (lift[1 : len(flat) + 1] - lift[len(flat) + 1 :]).T / 2e-6
 
     def _inverse_mass(self, x: Floats, y: Floats) -> tuple[Floats, float]:
         """Return ``x' M^-1 y`` as a function of the gains: ``M^-1 = M0^-1 G``, slope and constant."""

@@ -180,8 +180,10 @@ class LogData(MotionData):
 
     def scores(self, found: Coefficients, logs: Sequence[LogFit]) -> ModelScores:
         """Return force errors for the thesis's estimator alone, and otherwise prediction errors in windows."""
-        judged = self.windows.validation if self.held_out else self.windows.training
-        if self.settings.estimator == "derivative" or sum(len(one) for one in judged) < IDENTIFY.fewest_judged:
+        if (
+            self.settings.estimator == "derivative"
+            or sum(len(one) for one in self.windows.judged) < IDENTIFY.fewest_judged
+        ):
             return super().scores(found, logs)
         return self.windows.scores(found)
 

@@ -31,6 +31,7 @@ from ferryid.identify.rows import basis_for
 from ferryid.identify.settings import TEST_WINDOW_S, FitSettings, check_components
 from ferryid.identify.split import Split, split_rows
 from ferryid.identify.weak_data import WeakData, weak_data
+from ferryid.identify.window_length import with_best_length
 from ferryid.models import Model, ModelScores
 from ferryid.models.forces import Estimator, effective_mass
 from ferryid.models.prediction import FreeRun
@@ -86,7 +87,7 @@ def fit_opened(
     data = replace(data, split=parts.within([motion.valid for motion in data.motions]))
     run.progress("fitting")
     kind = settings.estimator
-    weak = weak_data(data)
+    weak = with_best_length(weak_data(data)) if kind != "derivative" else weak_data(data)
     why = weak.impossible if kind == "auto" else ""
     if why:
         kind = "derivative"

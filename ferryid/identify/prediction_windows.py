@@ -9,7 +9,7 @@ models are judged against knows no measured wind, current or payload, so that tw
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -31,37 +31,57 @@ from ferryid.vessel.profile import Profile
 
 @dataclass(frozen=True, eq=False)
 class PredictionWindows:
-    """Windows of logs, of which some train and others validate."""
+    """Windows of logs, of which some train and others validate.
+
+    Attributes
+    ----------
+    profile, settings, functions
+        Vessel, how to fit, and basis.
+    motions, split
+        The logs, and which of their rows train and validate.
+    training_s
+        Length of the training windows [s]; None: that of the others, in which models are judged.
+    """
 
     profile: Profile
     settings: FitSettings
     functions: Basis
     motions: tuple[Motion, ...]
     split: Split
+    training_s: float | None = field(default=None, kw_only=True)
 
     @cached_property
     def length_s(self) -> float:
         """Length of a window [s]."""
         return self.settings.weak_window_s or window_seconds(self.profile)
 
+    @property
+    def training_length_s(self) -> float:
+        """Length of a training window [s]."""
+        return self.training_s or self.length_s
+
     @cached_property
     def training(self) -> tuple[WeakRows, ...]:
         """Windows within training rows, one a log."""
-        return self._within(self.split.training)
+        return self._averaged(self.split.training, self.velocities, self.training_length_s)
 
     @cached_property
     def validation(self) -> tuple[WeakRows, ...]:
         """Windows within validation rows, one a log."""
-        return self._within(self.split.validation)
+        return self._averaged(self.split.validation, self.velocities, self.length_s)
 
-    def _within(self, masks: Sequence[Flags]) -> tuple[WeakRows, ...]:
-        return self._averaged(masks, self.velocities)
+    @cached_property
+    def judged(self) -> tuple[WeakRows, ...]:
+        """Windows in which models are judged: those that validate, or those of the training rows where none do."""
+        if self.split.kind != "none":
+            return self.validation
+        if self.training_length_s == self.length_s:
+            return self.training
+        return self._averaged(self.split.training, self.velocities, self.length_s)
 
-    def _averaged(self, masks: Sequence[Flags], velocities: Sequence[Floats]) -> tuple[WeakRows, ...]:
+    def _averaged(self, masks: Sequence[Flags], velocities: Sequence[Floats], length_s: float) -> tuple[WeakRows, ...]:
         return tuple(
-            average_over_windows(
-                motion, mask, self.profile, self.settings.scale, self.functions, self.length_s, velocity
-            )
+            average_over_windows(motion, mask, self.profile, self.settings.scale, self.functions, length_s, velocity)
             for motion, mask, velocity in zip(self.motions, masks, velocities, strict=True)
         )
 
@@ -78,7 +98,8 @@ class PredictionWindows:
         if self.settings.reduced or not any(mask.any() for mask in self.split.training):
             return measured
         steadied = tuple(complementary_filter(m.nu, m.nu, m.eta, m.rate_hz) for m in self.motions)
-        left = [self._left(self._averaged(self.split.training, each)) for each in (measured, steadied)]
+        length_s = self.training_length_s
+        left = [self._left(self._averaged(self.split.training, each, length_s)) for each in (measured, steadied)]
         return steadied if left[1] < left[0] else measured
 
     def _left(self, windows: Sequence[WeakRows]) -> float:
@@ -104,7 +125,7 @@ class PredictionWindows:
 
         Infinite for a model whose mass matrix cannot be inverted.
         """
-        windows = self.validation if self.split.kind != "none" else self.training
+        windows = self.judged
         terms = self.functions.terms
         added = effective_mass(self.profile, self.settings.scale, terms, found.theta) - self.base_mass
         tau, base, model = [np.zeros((0, 3))], [np.zeros((0, 3))], [np.zeros((0, 3))]
@@ -124,7 +145,7 @@ class PredictionWindows:
         """Return the errors of a model as a model file has them."""
         held_out = self.split.kind != "none"
         masks = self.split.validation if held_out else self.split.training
-        windows = self.validation if held_out else self.training
+        windows = self.judged
         return ModelScores(
             self.errors(found),
             rows=sum(len(one) for one in windows),

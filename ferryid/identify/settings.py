@@ -64,7 +64,8 @@ class FitSettings:
         ``"weak"``: the equations of motion are averaged over windows and nothing is differentiated, see
         `ferryid.identify.weak_rows`; ``"auto"``: the one of less error on folds of the training rows.
     weak_window_s
-        Length of the windows of the weak form [s]; None: 8 s for a vessel of 5 m, by Froude's law for others.
+        Length of the windows of the weak form [s]; None: 8 s for a vessel of 5 m, by Froude's law for others, and training
+        windows up to three times as long where these tell more.
     axes
         Axes that are fitted and judged. `on` leaves out sway for a vessel of which it is not measured; the base model's sway
         is then kept.

@@ -134,6 +134,12 @@ class IdentifyThresholds:
     fewest_windows: int = threshold(
         12, "windows", "fewest that the weak form trains on", "convention: more than the coefficients of any one axis"
     )
+    fewest_long_windows: int = threshold(
+        36,
+        "windows",
+        "fewest of more than the usual length that the weak form may train on",
+        "derived: in every fold of five there are then twice those of `fewest_windows`",
+    )
     fewest_judged: int = threshold(
         6,
         "windows",

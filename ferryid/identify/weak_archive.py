@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from ferryid.identify.pipeline import accept_estimate
 from ferryid.identify.settings import FitSettings, check_components
 from ferryid.identify.split import validation_blocks
 from ferryid.identify.thresholds import IDENTIFY
+from ferryid.identify.window_length import TRAINING_LENGTHS, best_length
 from ferryid.identify.window_store import load_windows
 from ferryid.identify.windowed_data import WindowedData
 from ferryid.regression.bases import Basis, make_basis
@@ -36,7 +38,8 @@ def fit_weak_archive(
     where = archived_folders(run.tables or run.out, profile, names)
     logs, functions = archived_windows(where, profile, settings, run.progress, divided=settings.split == "blocks")
     check_components(settings.components, functions)
-    data = WindowedData.of(profile, settings, functions, logs, *_divided(logs, settings.split))
+    trained, validated = _divided(logs, settings.split)
+    data = WindowedData.of(profile, settings, functions, logs, trained, validated)
     judged = sum(len(one) for one in data.windows.validation)
     if judged < IDENTIFY.fewest_judged:
         raise FerryIdError(
@@ -44,10 +47,25 @@ def fit_weak_archive(
             f"{counted(judged, 'validation window')} of {data.windows.length_s:.3g} s. "
             "Fix: ingest more or longer logs, or give --estimator derivative"
         )
+    if settings.weak_window_s is None:
+        data = best_length({1.0: data, **_longer(data, where, run)})
     run.progress("fitting")
     data.refuse_contradictions()
     estimate = estimate_correction(data, data.components(), settings.draws, run.progress)
     return accept_estimate(data, estimate, name, run)
+
+
+def _longer(data: WindowedData, where: Sequence[Path], run: RunContext) -> dict[float, WindowedData]:
+    """Return the data with longer training windows, by what the usual length is multiplied with."""
+    out = {}
+    for share in TRAINING_LENGTHS[1:]:
+        length_s = share * data.windows.length_s
+        settings = replace(data.settings, weak_window_s=length_s)
+        divided = data.settings.split == "blocks"
+        logs, _ = archived_windows(where, data.profile, settings, run.progress, divided=divided)
+        trained, _ = _divided(logs, data.settings.split)
+        out[share] = replace(data, trained=tuple(trained), training_s=length_s)
+    return out
 
 
 def archived_windows(

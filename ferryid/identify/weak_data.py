@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -14,12 +14,13 @@ from ferryid.effects.force_model import COEFFICIENTS, hull_of
 from ferryid.effects.hull_spread import default_hull_spread
 from ferryid.errors import FerryIdError
 from ferryid.identify.contradictions import response_of, wrong_size, wrong_way
-from ferryid.identify.feasible import Feasible, feasible_gains
+from ferryid.identify.feasible import Feasible, LiftTie, feasible_gains
 from ferryid.identify.fit_data import Estimate
 from ferryid.identify.inertia import relative_inertia, without_inertia, without_sway_coupling
 from ferryid.identify.log_conditions import Conditions, LoadSamples, estimate_conditions, sample_load
 from ferryid.identify.motion_data import LogData
 from ferryid.identify.outcome import Excitation, LogWind
+from ferryid.identify.prediction_windows import PredictionWindows
 from ferryid.identify.settings import FOLDS
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.weak_rows import STRIDES, WeakRows, to_force
@@ -76,14 +77,29 @@ class Whitened:
 
 @dataclass(frozen=True, eq=False)
 class WeakData(LogData):
-    """Motions of logs as windows of the weak form, of which some train and others validate."""
+    """Motions of logs as windows of the weak form, of which some train and others validate.
+
+    Attributes
+    ----------
+    training_s
+        Length of the training windows [s]; None: that of the windows in which models are judged.
+    """
+
+    training_s: float | None = field(default=None, kw_only=True)
+
+    @cached_property
+    def windows(self) -> PredictionWindows:
+        """Windows in which models are fitted and judged."""
+        return PredictionWindows(
+            self.profile, self.settings, self.functions, self.motions, self.split, training_s=self.training_s
+        )
 
     def model_settings(self, estimate: Estimate) -> dict[str, Any]:
         """Return grid rates, window lengths, and the estimator."""
         return {
             **super().model_settings(estimate),
             "estimator": "weak",
-            "weak_window_s": self.windows.length_s,
+            "weak_window_s": self.windows.training_length_s,
         }
 
     @cached_property
@@ -108,7 +124,7 @@ class WeakData(LogData):
             self.profile,
             self.load_samples,
             self.windows.training,
-            self.windows.length_s,
+            self.windows.training_length_s,
             float(self.settings.scale.get("zeta", 1.0)),
             self.functions.terms,
             self.functions.mask,
@@ -121,7 +137,7 @@ class WeakData(LogData):
         """Motion at which the wind load of the training windows is evaluated, one a log; None where wind was measured."""
         windows = self.windows
         return tuple(
-            sample_load(self.profile, motion, velocity, one, windows.length_s)
+            sample_load(self.profile, motion, velocity, one, windows.training_length_s)
             for motion, velocity, one in zip(self.motions, windows.velocities, windows.training, strict=True)
         )
 
@@ -147,7 +163,7 @@ class WeakData(LogData):
         """Why the weak form cannot be used; empty where it can."""
         if self.settings.residual != "measured":
             return f"the weak form explains the measured force, found --residual {self.settings.residual}"
-        found, length_s = sum(len(one) for one in self.windows.training), self.windows.length_s
+        found, length_s = sum(len(one) for one in self.windows.training), self.windows.training_length_s
         if found < IDENTIFY.fewest_windows:
             needed = counted(IDENTIFY.fewest_windows, "window")
             return f"the weak form needs {needed} of {length_s:.3g} s to train on, found {found}"
@@ -260,9 +276,33 @@ class WeakData(LogData):
         """Functions and target of the validation windows."""
         return CrossProducts.of(*(self._rows_of(one, self.whitening.posed) for one in self.windows.validation))
 
+    @property
+    def _coriolis(self) -> tuple[LiftTie, ...]:
+        """Coefficients that are the Coriolis force of the mass, but for a lift that is not bounded yet."""
+        masses: dict[tuple[str, int], tuple[tuple[int, int, float], ...]] = {
+            ("uv", 2): ((1, 1, 1.0), (0, 0, -1.0)),
+            ("ur", 1): ((0, 0, 1.0),),
+            ("ur", 2): ((1, 2, 0.5), (2, 1, 0.5)),
+        }
+        terms = self.functions.terms
+        return tuple(
+            LiftTie(terms.index(term), axis, own, np.inf) for (term, axis), own in masses.items() if term in terms
+        )
+
+    @property
+    def ties(self) -> tuple[LiftTie, ...]:
+        """What ties the Coriolis force to the mass: without sway there is nothing to tie, and without a hull model no bound.
+
+        What a hull model leaves out is small. Where there is none, lift may be as large as the Coriolis force itself.
+        """
+        if self.settings.reduced or not self.profile.hull.has_model:
+            return ()
+        spread = self.prior_factor * self._damping_spread
+        return tuple(replace(one, spread=float(spread[one.term, one.axis])) for one in self._coriolis)
+
     @cached_property
-    def prior_spread(self) -> Floats:
-        """Standard deviations of the prior of each gain, shape (K, 3); infinite where nothing is known."""
+    def _damping_spread(self) -> Floats:
+        """Standard deviations of the prior of the water's force, lift among it, shape (K, 3); infinite elsewhere."""
         spread = np.full((len(self.functions.terms), 3), np.inf)
         known = default_hull_spread(self.profile, self.training_velocities)
         if self.profile.hull.has_model:
@@ -271,6 +311,12 @@ class WeakData(LogData):
             for term, axis in places:
                 if term in self.functions.terms and not name.startswith("m"):
                     spread[self.functions.terms.index(term), axis] = known[COEFFICIENTS.index(name)]
+        return spread
+
+    @cached_property
+    def prior_spread(self) -> Floats:
+        """Standard deviations of the prior of each gain, shape (K, 3); infinite where nothing is known."""
+        spread = self._damping_spread.copy()
         share = IDENTIFY.mass_spread if self.profile.hull.has_model else IDENTIFY.unknown_mass_spread
         mass = self.windows.base_mass
         for column, name in enumerate(ACCELERATIONS):
@@ -278,13 +324,11 @@ class WeakData(LogData):
                 ratio = np.sqrt(np.diag(mass) / mass[column, column])
                 spread[self.functions.terms.index(name)] = share * np.where(np.arange(3) == column, 1.0, 0.3) * ratio
         # A mass that differs from the base model's has another Coriolis force: m22 - m11 turns the hull, m11 deflects it.
-        m11, m22 = (share * float(mass[axis, axis]) for axis in range(2))
-        beside = 0.3 * share * float(np.sqrt(mass[1, 1] * mass[2, 2]))
-        for term, axis, own in (("uv", 2, np.hypot(m11, m22)), ("ur", 1, m11), ("ur", 2, beside)):
-            if term in self.functions.terms:
-                spread[self.functions.terms.index(term), axis] = np.hypot(
-                    spread[self.functions.terms.index(term), axis], own
-                )
+        for one in self._coriolis:
+            own = [share * factor * float(np.sqrt(mass[i, i] * mass[j, j])) for i, j, factor in one.masses]
+            apart = all(i == j for i, j, _ in one.masses)
+            size = float(np.linalg.norm(own)) if apart else 0.3 * float(np.sum(own))
+            spread[one.term, one.axis] = np.hypot(spread[one.term, one.axis], size)
         return spread
 
     @cached_property
@@ -349,7 +393,7 @@ class WeakData(LogData):
         self, theta: Floats, intercept: Floats
     ) -> tuple[Sequence[CrossProducts], float, tuple[str, ...]]:
         """Return blocks of training windows as long as the whitened residual is correlated, each with its part of the prior."""
-        stride_s = self.windows.length_s / STRIDES
+        stride_s = self.windows.training_length_s / STRIDES
         rows = [one for one in self.whitened.rows if len(one.Y)]
         rates = [1.0 / stride_s] * len(rows)
         block_s, notes = block_seconds(rows, rates, theta, intercept)
@@ -368,7 +412,7 @@ class WeakData(LogData):
         it leaves the winds of the logs where they are. Errors in variables that remain shift every draw alike.
         """
         rng = np.random.default_rng(self.settings.seed)
-        information, out = self._information(), gains.copy()
+        information, out = self.information, gains.copy()
         for axis in range(3):
             own = np.flatnonzero(self.functions.mask[:, axis] & np.isfinite(self.prior_spread[:, axis]))
             every = np.flatnonzero(self.functions.mask[:, axis])
@@ -401,7 +445,7 @@ class WeakData(LogData):
         mask = without_inertia(self.functions.mask, terms, self.without_force)
         gains = fit_simpls(self.training, len(terms), allowed=mask).coefficients[-1]
         places = (terms.index("u_dot"), terms.index("v_dot"), terms.index("r_dot"))
-        response, spread = response_of(gains, self._information(), mask, places)
+        response, spread = response_of(gains, self.information, mask, places)
         where = f"the profile {self.profile.name}"
         share = relative_inertia(self.profile, self.windows.base_mass)
         if told := wrong_way(response, spread, where) or wrong_size(response, spread, share, where):
@@ -415,12 +459,14 @@ class WeakData(LogData):
             self.functions,
             mask,
             gains,
-            self._information(),
+            self.information,
             self.training_velocities,
+            ties=self.ties,
             reduced=self.settings.reduced,
         )
 
-    def _information(self) -> Floats:
+    @property
+    def information(self) -> Floats:
         """Return the second derivative of half the squared error over the gains, shape (3, K, K)."""
         Sxx = CrossProducts.of(*self.whitened.rows).centred()[0]
         with np.errstate(divide="ignore"):

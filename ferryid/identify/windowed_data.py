@@ -100,8 +100,9 @@ class WindowedData(WeakData):
         logs: Sequence[LogWindows],
         trained: Sequence[WindowPart],
         validated: Sequence[WindowPart],
+        training_s: float | None = None,
     ) -> WindowedData:
-        """Return the data of logs whose windows were divided."""
+        """Return the data of logs whose windows were divided; those that train may have a length of their own [s]."""
         parts = Split(settings.split, (), (), min(log.purge_s for log in logs))
         return cls(
             profile=profile,
@@ -115,6 +116,7 @@ class WindowedData(WeakData):
             logs=tuple(logs),
             trained=tuple(trained),
             validated=tuple(validated),
+            training_s=training_s,
         )
 
     @property
@@ -130,7 +132,16 @@ class WindowedData(WeakData):
     @cached_property
     def windows(self) -> KnownWindows:
         """Windows in which models are fitted and judged."""
-        return KnownWindows(self.profile, self.settings, self.functions, (), self.split, self.trained, self.validated)
+        return KnownWindows(
+            self.profile,
+            self.settings,
+            self.functions,
+            (),
+            self.split,
+            self.trained,
+            self.validated,
+            training_s=self.training_s,
+        )
 
     @property
     def load_samples(self) -> tuple[LoadSamples | None, ...]:
@@ -227,7 +238,7 @@ class WindowedData(WeakData):
             "archive": True,
             "grid_hz": sorted({log.rate_hz for log in self.logs}),
             "estimator": "weak",
-            "weak_window_s": self.windows.length_s,
+            "weak_window_s": self.windows.training_length_s,
         }
 
     def warnings(self, excitation: Excitation, scores: ModelScores) -> tuple[str, ...]:

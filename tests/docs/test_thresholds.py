@@ -131,7 +131,7 @@ NO_DECISION = {
         effects.linear_evidence DIFFERENCE_STEP
         effects.shallow_water CELLS
         effects.wind SPEEDS_MPS BEARINGS
-        identify.feasible _ROUNDS _SHARES _DIRECTIONS
+        identify.feasible _ROUNDS _SHARES _DIRECTIONS _TIE_STEPS
         identify.log_conditions _DIRECTIONS _SPEEDS _STEP_MPS
         identify.settings WINDOWS_S
         models.forces.residual _PASSES
@@ -164,6 +164,7 @@ NO_DECISION = {
         identify.split EVERY
         identify.sweeps.structure_sweep DRAWS
         identify.sweeps.weak_sweep USUAL _WINDOWS_A_FOLD
+        identify.window_length TRAINING_LENGTHS
         models.forces.estimator CHUNK_ROWS
         effects.shallow_water MOST_VALUES
         effects.wind KEPT

@@ -1,18 +1,22 @@
 """``python -m tests.rivals`` writes reports/rivals.md.
 
+What each trial and each set of recordings gives is appended to a file of lines as soon as it is known: a run that was ended
+goes on from there, as long as no source has changed. ``--page`` writes the page from what is there, without any run.
 Real recordings are left out, and the page says so, where they are absent.
 """
 
 from __future__ import annotations
 
 import argparse
-import tempfile
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 from tests.evidence import stamp
-from tests.real.places import REPORTS
+from tests.real.places import REPORTS, ROOT
+from tests.rivals.lines import Lines, packed, unpacked
 from tests.rivals.page import (
     ELSEWHERE,
     HEAD,
@@ -25,45 +29,92 @@ from tests.rivals.page import (
     targets,
     variants_section,
 )
-from tests.rivals.recorded import CASES, recorded
-from tests.rivals.simulated import KINDS, Findings, try_all
+from tests.rivals.recorded import CASES, Case, Recorded, recorded
+from tests.rivals.simulated import KINDS, Findings, Kind, try_one
+
+WORK = ROOT / "build" / "rivals"
+Unit = tuple[str, Callable[..., Any], tuple[Any, ...]]
+"""Name of a unit of work, and what does it."""
 
 
 def main() -> None:
-    """Run all comparisons and write the page."""
+    """Do what is not done yet, and write the page."""
     parser = argparse.ArgumentParser(prog="python -m tests.rivals")
     parser.add_argument("--trials", type=int, default=5, help="simulated trials of each kind")
-    count = parser.parse_args().trials
-    lines, ahead, absent = [SIMULATED_HEAD], [], []
+    parser.add_argument("--processes", type=int, default=2, help="processes side by side")
+    parser.add_argument("--page", action="store_true", help="write the page from what is known; run nothing")
+    options = parser.parse_args()
+    lines = Lines.of(WORK / "lines.jsonl")
+    if not options.page:
+        run(units(options.trials, WORK / "logs"), lines, options.processes)
+    (REPORTS / "rivals.md").write_text(page(lines.known()), encoding="utf-8")
+    stamp(REPORTS / "rivals.md")
+
+
+def units(trials: int, folder: Path) -> list[Unit]:
+    """Return all units of work: recordings first, then the first trial of every kind, the second, and so on."""
+    every: list[Unit] = [(case.name, recorded_unit, (case,)) for case in CASES]
+    every += [(trial_name(kind, seed), trial_unit, (kind, seed, folder)) for seed in range(trials) for kind in KINDS]
+    return every
+
+
+def trial_name(kind: Kind, seed: int) -> str:
+    """Return the name of the unit of a trial."""
+    return f"{kind.name}, trial {seed}"
+
+
+def trial_unit(kind: Kind, seed: int, folder: Path) -> list[dict[str, Any]]:
+    """Return what the methods and the variants find in a trial, as plain values."""
+    return [packed(one) for one in try_one(kind, seed, folder)]
+
+
+def recorded_unit(case: Case) -> dict[str, Any] | None:
+    """Return what comes of a set of recordings, as plain values; None where they are absent."""
+    one = recorded(case)
+    return None if one is None else one.plain()
+
+
+def run(every: Sequence[Unit], lines: Lines, processes: int) -> None:
+    """Do the units that are not known yet, and append what each gives."""
+    known = lines.known()
+    left = [unit for unit in every if unit[0] not in known]
+    if processes < 2:
+        for name, work, given in left:
+            lines.add(name, work(*given))
+            print(name, flush=True)
+        return
+    with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
+        begun = {pool.submit(work, *given): name for name, work, given in left}
+        for done in as_completed(begun):
+            lines.add(begun[done], done.result())
+            print(begun[done], flush=True)
+
+
+def page(known: dict[str, Any]) -> str:
+    """Return the page from the results of units."""
+    lines, ahead = [SIMULATED_HEAD], list[str]()
     simulated, varied = dict[str, list[Findings]](), dict[str, list[Findings]]()
-    recordings = []
-    with tempfile.TemporaryDirectory() as folder, ProcessPoolExecutor(2, get_context("spawn")) as pool:
-        kinds = KINDS if count else ()
-        trying = [pool.submit(try_all, kind, count, Path(folder)) for kind in kinds]
-        recording = [pool.submit(recorded, case) for case in CASES]
-        for kind, task in zip(kinds, trying, strict=True):
-            found, varied[kind.name] = task.result()
-            simulated[kind.name] = found
-            print(kind.name, flush=True)
-            lines += simulated_section(kind.name, found)
-            ahead += better_simulated(kind.name, found)
-        lines += variants_section(varied) if varied else []
-        lines.append(RECORDED_HEAD)
-        for case, result in zip(CASES, recording, strict=True):
-            one = result.result()
-            print(case.name, flush=True)
-            if one is None:
-                absent.append(case.name)
-                continue
-            recordings.append(one)
-            lines += recorded_section(one)
-            ahead += better(one)
+    for kind in KINDS:
+        start = trial_name(kind, 0)[:-1]
+        trials = [one for name, one in known.items() if name.startswith(start)]
+        if not trials:
+            continue
+        simulated[kind.name] = [unpacked(one[0]) for one in trials]
+        varied[kind.name] = [unpacked(one[1]) for one in trials if one[1]]
+        lines += simulated_section(kind.name, simulated[kind.name])
+        ahead += better_simulated(kind.name, simulated[kind.name])
+    varied = {name: trials for name, trials in varied.items() if trials}
+    lines += variants_section(varied) if varied else []
+    lines.append(RECORDED_HEAD)
+    absent = [case.name for case in CASES if known.get(case.name) is None]
+    recordings = [Recorded.of(case, known[case.name]) for case in CASES if case.name not in absent]
+    for one in recordings:
+        lines += recorded_section(one)
+        ahead += better(one)
     if absent:
         lines.append(f"\nNot at hand, and so left out: {', '.join(absent)}.\n")
     lines += [ELSEWHERE, *(ahead or ["Nowhere."]), ""]
-    lines = [HEAD, *targets(simulated, recordings, absent), *lines]
-    (REPORTS / "rivals.md").write_text("\n".join(lines), encoding="utf-8")
-    stamp(REPORTS / "rivals.md")
+    return "\n".join([HEAD, *targets(simulated, recordings, absent), *lines])
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ from ferryid.identify.log_sums import folds_by_blocks, force_free_axes, sum_log
 from ferryid.identify.model_selection import select_model
 from ferryid.identify.weak_data import weak_data
 from ferryid.identify.weak_rows import to_force
+from ferryid.identify.window_length import with_best_length
 from ferryid.types import Floats, Ints, no_progress
 from ferryid.validation.rivals import stepwise
 from tests.rivals.output_error import fit_output_error
@@ -42,7 +43,7 @@ def base(task: Task, draws: int) -> Coefficients:
 
 def weak(task: Task, draws: int) -> Coefficients:
     """Return what ``ferryid fit --estimator weak`` finds."""
-    data = weak_data(task.data)
+    data = with_best_length(weak_data(task.data))
     return estimate_correction(data, data.components(), draws, no_progress).coefficients
 
 
@@ -53,9 +54,11 @@ def derivative(task: Task, draws: int) -> Coefficients:
 
 def auto(task: Task, draws: int) -> Coefficients:
     """Return what ``ferryid fit`` finds: by the one of its estimators that errs less on folds of the training rows."""
-    data = weak_data(task.data)
-    errors = fold_error(data, data.components()), fold_error(task.data, _derivative_components(task))
-    return (derivative if errors[1] < errors[0] else weak)(task, draws)
+    data = with_best_length(weak_data(task.data))
+    components = data.components(), _derivative_components(task)
+    errors = fold_error(data, components[0]), fold_error(task.data, components[1])
+    chosen = (task.data, components[1]) if errors[1] < errors[0] else (data, components[0])
+    return estimate_correction(*chosen, draws, no_progress).coefficients
 
 
 def _derivative_components(task: Task) -> int:

@@ -50,13 +50,16 @@ method's terms describe exactly. The breeze of {hypot(*WIND_MPS):.1f} m/s, in th
 in the plant steady, is not measured. *m11*, *m22*, *m33*: relative error, median over trials. *Damping*: error of its force at
 the trial's velocities over its size, median. *Held*: share of 95 % intervals of the three inertias that hold the truth; by
 block bootstrap of {DRAWS} draws for ferryid and thesis, for the others those of white residuals, for weak SINDy none.
-*Position*: median error of free runs after {HORIZONS_S[-1]:g} s, diverged ones counted as infinite.
+*Position*: median error of free runs after {HORIZONS_S[-1]:g} s, diverged ones counted as infinite. *Expected
+error of the damping*: by the covariance of ferryid's own estimate, in which are noise, prior and unmeasured wind, and by what
+the nearest combination of the terms leaves of the true force; median. It is the limit of these windows, terms and prior.
 """
 
 VARIANTS_HEAD = """
 ## Errors in the regressors
 
-The weak form with other treatments of noise in the velocity and of wind that nobody measured, on the trials above; medians.
+The weak form with other treatments of noise in the velocity and of wind that nobody measured, on the first three trials of each
+kind; medians.
 *As it is*: of the velocities measured and steadied by positions those that leave less. *Noise-corrected products*: the products
 of either velocity's regressors with the other's in place of squares, without bounds (Fuller 1987, section 2.4). Orders are no
 instruments in a closed loop: the controller forms them from the same noisy navigation.
@@ -91,6 +94,9 @@ def simulated_targets(found: Mapping[str, Sequence[Mapping[str, Found | str]]]) 
         values = [numbers[place] for numbers in every.values()]
         met = sum(value <= most for value in values)
         span = f"{min(values):.1f} to {max(values):.1f} %"
+        if what == "damping force":
+            limits = [expected(trials) for trials in found.values()]
+            span += f"; expected {min(limits):.1f} to {max(limits):.1f} %"
         rows.append(f"| median error of {what} at most {most:g} % | {met} of {len(values)} kinds | {span} |")
     met = "yes" if 93.0 <= share <= 97.0 else "no"
     trials = sum(len(one) for one in found.values())
@@ -162,10 +168,16 @@ def simulated_section(name: str, found: Sequence[Mapping[str, Found | str]]) -> 
     form = [".1f", ".1f", ".1f", ".1f", ".0f", ".2f", ".0f", ".1f"]
     return [
         f"\n### {name[0].upper()}{name[1:]}\n",
-        f"{counted(len(found), 'trial')}.",
+        f"{counted(len(found), 'trial')}. Expected error of the damping: {expected(found):.1f} %.",
         "",
         *table(head, rows, low, form),
     ]
+
+
+def expected(found: Sequence[Mapping[str, Found | str]]) -> float:
+    """Return the median error of the damping force that is to be expected [%]; see `Found`."""
+    own = [one[OURS].expected for one in found if isinstance(one[OURS], Found)]
+    return 100.0 * float(np.nanmedian(own)) if own else float("nan")
 
 
 def table(

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 from ferryid.errors import FerryIdError
 from ferryid.signals.prepare import Opened, open_track
 from ferryid.vessel import load_profile
 from tests.real.places import DATA
+from tests.rivals.lines import packed_scores, unpacked_scores
 from tests.rivals.scores import Score, judge, together
 from tests.rivals.task import Task
 
@@ -51,6 +53,21 @@ class Recorded:
     logs: int
     seconds: float
     refused: tuple[str, ...]
+
+    def plain(self) -> dict[str, Any]:
+        """Return all but the case as plain values."""
+        return {
+            "scores": packed_scores(self.scores),
+            "logs": self.logs,
+            "seconds": self.seconds,
+            "refused": list(self.refused),
+        }
+
+    @classmethod
+    def of(cls, case: Case, plain: Mapping[str, Any]) -> Recorded:
+        """Return what `plain` gave."""
+        scores = unpacked_scores(plain["scores"])
+        return cls(case, scores, plain["logs"], plain["seconds"], tuple(plain["refused"]))
 
 
 def recorded(case: Case) -> Recorded | None:

@@ -15,6 +15,7 @@ from ferryid.identify.fit_data import Coefficients
 from ferryid.identify.log_conditions import Conditions
 from ferryid.identify.weak_data import WeakData, weak_data
 from ferryid.identify.weak_rows import to_force
+from ferryid.identify.window_length import with_best_length
 from ferryid.signals.complementary_filter import complementary_filter
 from ferryid.types import Floats, no_progress
 from tests.rivals.task import Task, coefficients
@@ -22,7 +23,7 @@ from tests.rivals.task import Task, coefficients
 
 def as_it_is(task: Task, draws: int) -> Coefficients:
     """Return what the weak form finds."""
-    return _estimate(weak_data(task.data), draws)
+    return _estimate(with_best_length(weak_data(task.data)), draws)
 
 
 def measured_velocity(task: Task, draws: int) -> Coefficients:
@@ -38,7 +39,7 @@ def steadied_velocity(task: Task, draws: int) -> Coefficients:
 
 def without_winds(task: Task, draws: int) -> Coefficients:
     """Return what it finds without winds of single logs: steady forces along the hull, north and east stay."""
-    data = weak_data(task.data)
+    data = with_best_length(weak_data(task.data))
     data.__dict__["conditions"] = Conditions.none(data.windows.training, len(data.functions.terms))
     return _estimate(data, draws)
 
@@ -49,14 +50,14 @@ def noise_corrected(task: Task, draws: int) -> Coefficients:
     The products of regressors from measured and from steadied velocities, whose noises are nearly independent, replace the
     squares of either (the symmetrised instrument of repeated measurements; Fuller 1987, section 2.4).
     """
-    data = weak_data(task.data)
+    data = with_best_length(weak_data(task.data))
     first = _with_velocities(task, [m.nu for m in task.data.motions])
     slow = [complementary_filter(m.nu, m.nu, m.eta, m.rate_hz) for m in task.data.motions]
     return _instrumented(data, *(_regressors(one) for one in (first, _with_velocities(task, slow))))
 
 
 def _with_velocities(task: Task, velocities: list[Floats]) -> WeakData:
-    data = weak_data(replace(task.data))
+    data = with_best_length(weak_data(replace(task.data)))
     data.windows.__dict__["velocities"] = tuple(velocities)
     return data
 

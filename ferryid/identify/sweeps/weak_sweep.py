@@ -246,7 +246,8 @@ def _select(
             f"{judged[0].name}: cross-validation needs two folds with windows of {judged[0].length_s:.3g} s, "
             f"found {len(tests)}. Fix: use a longer log or more logs"
         )
-    whole_data = WindowedData.of(profile, lengths[0][0], functions, lengths[0][1], *2 * [_parts(lengths[0][1])])
+    first, logs = lengths[0]
+    whole_data = WindowedData.of(profile, first, functions, logs, _parts(logs), _parts(logs))
     whole_data.refuse_contradictions()
     fitted = functions.mask.any(axis=0)
     held = whole_data.without_force & fitted if settings.inertia == "auto" else np.zeros(3, dtype=bool)

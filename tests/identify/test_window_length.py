@@ -1,0 +1,76 @@
+"""How long training windows are, and what ties the Coriolis force to the mass."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ferryid.identify.feasible import LiftTie, feasible_gains
+from ferryid.identify.split import Split
+from ferryid.identify.weak_rows import to_force
+from ferryid.identify.window_length import prediction_scatter, with_best_length
+from ferryid.models.forces import effective_mass
+from tests.identify.rounds import PROFILE
+from tests.identify.test_weak_form import BASIS, SCALE, K, data_of
+from tests.identify.trials import measured
+
+
+def test_noisy_positions_and_velocities_ask_for_longer_windows_than_exact_ones() -> None:
+    exact, noisy = (
+        with_best_length(data_of([measured(1, seconds=900.0, noise=noise, jitter=jitter)]))
+        for noise, jitter in ((60.0, 0.0), (0.0, 0.05))
+    )
+    assert exact.windows.training_length_s == exact.windows.length_s
+    assert noisy.windows.training_length_s >= 2.0 * noisy.windows.length_s
+
+
+def test_the_scatter_falls_as_the_root_of_the_number_of_logs() -> None:
+    one, four = (data_of([measured(seed, noise=80.0) for seed in range(1, 1 + count)]) for count in (1, 4))
+    at = np.concatenate([each.regressors(BASIS.terms) for each in one.training_windows])
+    at = at - at.mean(axis=0)
+    ratio = prediction_scatter(one, at) / prediction_scatter(four, at)
+    np.testing.assert_allclose(ratio, 2.0, rtol=0.4)
+
+
+def test_a_length_that_is_given_stays_and_short_logs_keep_the_usual_one() -> None:
+    given = with_best_length(data_of([measured(1, seconds=900.0, jitter=0.05)], weak_window_s=9.0))
+    assert given.windows.training_length_s == 9.0
+    short = with_best_length(data_of([measured(1, seconds=120.0, jitter=0.05)]))
+    assert short.windows.training_length_s == short.windows.length_s
+
+
+def test_models_are_judged_in_windows_of_the_usual_length_whatever_trains() -> None:
+    plain = data_of([measured(1, seconds=900.0, jitter=0.05)])
+    long = replace(plain, training_s=3.0 * plain.windows.length_s)
+    rows = plain.motions[0].valid
+    half = np.arange(len(rows)) < len(rows) // 2
+    split = Split("blocks", (rows & half,), (rows & ~half,), 0.0)
+    judged = [replace(one, split=split).windows.validation[0] for one in (plain, long)]
+    np.testing.assert_array_equal(judged[0].start, judged[1].start)
+    # Where nothing is held out, those of the training rows.
+    np.testing.assert_array_equal(long.windows.judged[0].start, plain.windows.training[0].start)
+    assert len(long.windows.training[0]) < 0.5 * len(plain.windows.training[0])
+
+
+@pytest.mark.parametrize("sure", [True, False])
+def test_a_turning_moment_of_surge_and_sway_goes_with_the_masses_unless_lift_is_unbounded(sure: bool) -> None:
+    uv, u_dot, v_dot = (BASIS.terms.index(name) for name in ("uv", "u_dot", "v_dot"))
+    gains = np.zeros((K, 3))
+    gains[uv, 2] = 400.0
+    information = np.array([1e4 * np.eye(K)] * 3)
+    information[2][uv, uv] = 1e-3
+    tie = LiftTie(uv, 2, ((1, 1, 1.0), (0, 0, -1.0)), 1.0 if sure else np.inf)
+    nu = np.random.default_rng(1).standard_normal((500, 3)) * [0.5, 0.2, 0.05]
+    found = feasible_gains(PROFILE, SCALE, BASIS, BASIS.mask, gains, information, nu, ties=(tie,))
+    base = effective_mass(PROFILE, SCALE, (), np.zeros((0, 3)))
+    theta, _ = to_force(found.gains, np.zeros(3), BASIS.terms, base)
+    added = effective_mass(PROFILE, SCALE, BASIS.terms, theta) - base
+    lift = theta[uv, 2] - (added[1, 1] - added[0, 0])
+    assert bool(abs(lift) < 5.0) is sure
+    # Draws are pulled alike, to a lift that is drawn.
+    drawn = found.moved(np.repeat(gains[None], 400, axis=0))[:, uv, 2]
+    assert bool(drawn.std() > 0.3) is sure
+    assert theta[u_dot, 0] == pytest.approx(added[0, 0])
+    assert theta[v_dot, 1] == pytest.approx(added[1, 1])

@@ -1,0 +1,53 @@
+"""Results kept as lines: what was done is not done again, and what was cut off or is of other sources does not count."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from tests.rivals.__main__ import run
+from tests.rivals.lines import Lines, packed, packed_scores, unpacked, unpacked_scores
+from tests.rivals.scores import Score
+from tests.rivals.simulated import Found
+
+
+def test_a_run_that_was_ended_goes_on_where_it_stood(tmp_path: Path) -> None:
+    done: list[str] = []
+
+    def work(name: str) -> str:
+        done.append(name)
+        return name.upper()
+
+    units = [(name, work, (name,)) for name in ("a", "b", "c")]
+    lines = Lines(tmp_path / "lines.jsonl", "now")
+    run(units[:2], lines, 1)
+    text = lines.path.read_text()
+    lines.path.write_text(text[: text.rindex('"result"')])
+    run(units, lines, 1)
+    assert done == ["a", "b", "b", "c"]
+    assert lines.known() == {"a": "A", "b": "B", "c": "C"}
+    assert Lines(lines.path, "later").known() == {}
+
+
+def test_findings_and_scores_come_back(tmp_path: Path) -> None:
+    runs = np.full((2, 3, 4), 0.25)
+    runs[0, 1] = np.inf
+    runs[1, 2] = np.nan
+    found = Found(np.array([0.1, -0.2, 0.3]), 0.04, np.array([1.0, 0.0, np.nan]), runs, 1.5, 0.03)
+    score = Score(np.zeros((0, 3)), np.ones((2, 3)), np.ones(2), runs, 2.0, ("mass matrix not positive",))
+    lines = Lines(tmp_path / "lines.jsonl", "now")
+    lines.add("trial", packed({"weak": found, "thesis": "no model"}))
+    lines.add("case", packed_scores({"weak": score}))
+    known = lines.known()
+    back = unpacked(known["trial"])
+    assert back["thesis"] == "no model"
+    one = back["weak"]
+    assert isinstance(one, Found)
+    np.testing.assert_array_equal(one.runs, runs)
+    np.testing.assert_array_equal(one.covered, found.covered)
+    assert (one.damping, one.expected) == (0.04, 0.03)
+    again = unpacked_scores(known["case"])["weak"]
+    assert again.windows.shape == (0, 3)
+    assert again.failed == score.failed
+    assert again.diverged == 1
