@@ -16,6 +16,7 @@ from typing import Any
 
 from tests.evidence import stamp
 from tests.real.places import REPORTS, ROOT
+from tests.rivals import second_logs
 from tests.rivals.lines import Lines, packed, unpacked
 from tests.rivals.page import (
     ELSEWHERE,
@@ -30,8 +31,10 @@ from tests.rivals.page import (
     variants_section,
 )
 from tests.rivals.recorded import CASES, Case, Recorded, recorded
+from tests.rivals.second_logs import cases, try_case
 from tests.rivals.simulated import KINDS, Findings, Kind, try_one
 
+SECOND = "second log, case "
 WORK = ROOT / "build" / "rivals"
 Unit = tuple[str, Callable[..., Any], tuple[Any, ...]]
 """Name of a unit of work, and what does it."""
@@ -41,20 +44,22 @@ def main() -> None:
     """Do what is not done yet, and write the page."""
     parser = argparse.ArgumentParser(prog="python -m tests.rivals")
     parser.add_argument("--trials", type=int, default=5, help="simulated trials of each kind")
+    parser.add_argument("--second", type=int, default=10, help="cases of the proof with a second log")
     parser.add_argument("--processes", type=int, default=2, help="processes side by side")
     parser.add_argument("--page", action="store_true", help="write the page from what is known; run nothing")
     options = parser.parse_args()
     lines = Lines.of(WORK / "lines.jsonl")
     if not options.page:
-        run(units(options.trials, WORK / "logs"), lines, options.processes)
+        run(units(options.trials, options.second, WORK / "logs"), lines, options.processes)
     (REPORTS / "rivals.md").write_text(page(lines.known()), encoding="utf-8")
     stamp(REPORTS / "rivals.md")
 
 
-def units(trials: int, folder: Path) -> list[Unit]:
-    """Return all units of work: recordings first, then the first trial of every kind, the second, and so on."""
+def units(trials: int, second: int, folder: Path) -> list[Unit]:
+    """Return all units of work: recordings, then the first trial of every kind, the second, and so on, then second logs."""
     every: list[Unit] = [(case.name, recorded_unit, (case,)) for case in CASES]
     every += [(trial_name(kind, seed), trial_unit, (kind, seed, folder)) for seed in range(trials) for kind in KINDS]
+    every += [(f"{SECOND}{case.name}", try_case, (case, folder / "second")) for case in cases()[:second]]
     return every
 
 
@@ -105,6 +110,8 @@ def page(known: dict[str, Any]) -> str:
         ahead += better_simulated(kind.name, simulated[kind.name])
     varied = {name: trials for name, trials in varied.items() if trials}
     lines += variants_section(varied) if varied else []
+    second = [one for name, one in known.items() if name.startswith(SECOND)]
+    lines += second_logs.section(second) if second else []
     lines.append(RECORDED_HEAD)
     absent = [case.name for case in CASES if known.get(case.name) is None]
     recordings = [Recorded.of(case, known[case.name]) for case in CASES if case.name not in absent]
@@ -114,7 +121,7 @@ def page(known: dict[str, Any]) -> str:
     if absent:
         lines.append(f"\nNot at hand, and so left out: {', '.join(absent)}.\n")
     lines += [ELSEWHERE, *(ahead or ["Nowhere."]), ""]
-    return "\n".join([HEAD, *targets(simulated, recordings, absent), *lines])
+    return "\n".join([HEAD, *targets(simulated, recordings, absent, second), *lines])
 
 
 if __name__ == "__main__":

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from math import hypot, isfinite
+from typing import Any
 
 import numpy as np
 
 from ferryid.counts import counted
+from tests.rivals import second_logs
 from tests.rivals.output_error import SEGMENT_S
 from tests.rivals.recorded import Recorded
 from tests.rivals.scores import HORIZONS_S, Score
@@ -131,11 +133,19 @@ def recorded_targets(every: Sequence[Recorded]) -> list[str]:
 
 
 def targets(
-    found: Mapping[str, Sequence[Mapping[str, Found | str]]], recorded: Sequence[Recorded], absent: Sequence[str]
+    found: Mapping[str, Sequence[Mapping[str, Found | str]]],
+    recorded: Sequence[Recorded],
+    absent: Sequence[str],
+    second: Sequence[Mapping[str, Any]] = (),
 ) -> list[str]:
     """Return the table of what was aimed at and what was reached, by ferryid's default."""
-    rows = [*(simulated_targets(found) if found else []), *(recorded_targets(recorded) if recorded else [])]
+    rows = [
+        *(simulated_targets(found) if found else []),
+        *(second_logs.targets(second) if second else []),
+        *(recorded_targets(recorded) if recorded else []),
+    ]
     missing = [] if found else ["simulated trials"]
+    missing += [] if second else ["second logs of the proof"]
     missing += ["recordings"] if absent and not recorded else []
     left = [f"\nNot tested: {', '.join(missing)}."] if missing else []
     return [

@@ -1,0 +1,164 @@
+"""Second logs of the proof: the model that ``diagnose`` stores, ``fit``'s and those of rivals on another log of the same truth.
+
+Cases are those of ``ferryid prove``: a vessel of the independent plant in six degrees of freedom, something that its profile
+does not have, a hull that is wrong by some per cent. All learn from the first log and are judged on the second.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cache, partial
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ferryid.counts import counted
+from ferryid.errors import FerryIdError
+from ferryid.identify import fit_logs
+from ferryid.identify.fit_data import Coefficients
+from ferryid.identify.settings import FitSettings
+from ferryid.models import Model
+from ferryid.models.prediction import Prediction, predict
+from ferryid.signals.prepare import Prepared, open_track
+from ferryid.types import AXES, RunContext
+from ferryid.validation.case import Case
+from ferryid.validation.case_sampling import sample_cases
+from ferryid.validation.log_generation import generate
+from ferryid.validation.records import DIAGNOSED, TransferResult, TransferScore
+from ferryid.validation.rivals import RIVALS
+from ferryid.validation.rivals.learner import SMOOTHER, WINDOW_S, LearnedModel
+from ferryid.validation.transfer_test import transfer_test
+from ferryid.validation.worker import diagnose_log
+from ferryid.vessel import load_profile
+from ferryid.vessel.profile import Profile
+from tests.rivals.output_error import fit_output_error
+from tests.rivals.task import Task
+
+SEED, RUNS = 2020, 0.2
+"""Of the draw of cases, of which the first are taken."""
+FIT = "fit"
+NEAR = 1.05
+"""Error over the best one's up to which a model counts as best."""
+
+
+@cache
+def cases() -> tuple[Case, ...]:
+    """Return the cases in their order; those of several logs are left out."""
+    return tuple(sample_cases(SEED, RUNS))
+
+
+def try_case(case: Case, folder: Path) -> dict[str, Any]:
+    """Return the scores of all models on the second log of a case, as plain values."""
+    place = folder / case.name
+    first, second = generate(case, place), generate(case, place / "second", transfer=True)
+    out = place / "out"
+    diagnosis = diagnose_log(first.log, first.profile, out)
+    diagnosed = None if diagnosis.model is None else out / diagnosis.model
+    learners = {FIT: learn_fit, **RIVALS, "output error": learn_output_error}
+    profile = load_profile(first.profile)
+    result = transfer_test(str(first.log), str(second.log), profile, out, diagnosed=diagnosed, rivals=learners)
+    return {"cell": case.cell, **result.to_json()}
+
+
+def learn_fit(log: str, profile: Profile, out: Path) -> LearnedModel:
+    """Fit as ``ferryid fit`` does."""
+    return _learned(FIT, _fitted(log, profile, out), profile)
+
+
+def learn_output_error(log: str, profile: Profile, out: Path) -> LearnedModel:
+    """Fit by output error, with the terms of ``ferryid fit``."""
+    task = Task.of(profile, [open_track(log, profile, out)])
+    try:
+        found: Coefficients = fit_output_error(task, 0)
+    except ValueError as error:
+        raise FerryIdError(f"{log}: {error}") from error
+    like = _fitted(log, profile, out)
+    if like.terms != task.functions.terms:
+        raise FerryIdError(f"{log}: output error has other terms than the fit")
+    return _learned("output error", replace(like, theta=found.theta, intercept=found.intercept), profile)
+
+
+def _fitted(log: str, profile: Profile, out: Path) -> Model:
+    return fit_logs([log], profile, FitSettings(draws=2), RunContext(out)).model
+
+
+def _learned(name: str, model: Model, profile: Profile) -> LearnedModel:
+    def expect(given: Model, prepared: Prepared) -> Prediction:
+        return predict(given, prepared, profile, window_s=WINDOW_S, smoother=SMOOTHER)
+
+    return LearnedModel(name, partial(expect, model))
+
+
+def force_error(score: TransferScore) -> float:
+    """Return the squared force error over the base model's, mean of the axes; infinite without a prediction."""
+    values = [score.mse.get(axis) for axis in AXES]
+    known = [one for one in values if one is not None and isfinite(one)]
+    return float(np.mean(known)) if known else float("inf")
+
+
+def position_error(score: TransferScore) -> float:
+    """Return the position error of free runs after 60 s [m]; infinite where there is none or a run diverged."""
+    return float("inf") if score.position_m is None or score.diverged else score.position_m
+
+
+def section(found: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return the part of the page about second logs."""
+    results = [_result(one) for one in found]
+    lines = [
+        "\n## Second logs of the proof\n",
+        f"{counted(len(results), 'case')} of `ferryid prove` (seed {SEED}), each learnt from its first log and judged on its "
+        "second. *Force*: squared force error over the base model's, mean of the axes, with the noise of velocities smoothed "
+        f"over {WINDOW_S:g} s in it. *Position*: of free runs after 60 s over the base model's. Both are medians; a model that "
+        "there is not, or of which a run diverges, counts as infinite. *Best*: logs on which it has the least error, or at "
+        f"most {NEAR:g} times that. Output error and `fit` have the same terms; sparse regressions choose from physics, too.",
+        "",
+        "| model | force | position | best, force | best, position | no model or diverged |",
+        "|---|---|---|---|---|---|",
+    ]
+    for name in results[0].methods:
+        force = np.array([force_error(one.methods[name]) for one in results])
+        position = np.array([position_error(one.methods[name]) for one in results])
+        base = np.array([one.base.position_m or np.nan for one in results])
+        best = [np.mean(_best(results, name, measure)) for measure in (force_error, position_error)]
+        title = "diagnosed and learnt (`diagnose`)" if name == DIAGNOSED else name
+        lines.append(
+            f"| {title} | {np.median(force):.2f} | {np.nanmedian(position / base):.2f} | {100 * best[0]:.0f} % | "
+            f"{100 * best[1]:.0f} % | {int(np.sum(~np.isfinite(position)))} |"
+        )
+    return lines
+
+
+def targets(found: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return what is aimed at on second logs and what was reached, as rows of a table."""
+    results = [_result(one) for one in found]
+    rows = []
+    for what, measure in (("force", force_error), ("free run", position_error)):
+        share = 100.0 * float(np.mean(_best(results, DIAGNOSED, measure)))
+        met = "yes" if share >= 90.0 else "no"
+        rows.append(
+            f"| second logs: diagnosed model best or within 5 %, {what}, on 90 % | {met} | "
+            f"{share:.0f} % of {len(results)} logs |"
+        )
+    ratios = []
+    for one in results:
+        rival = min(position_error(score) for name, score in one.methods.items() if name not in (DIAGNOSED, FIT))
+        ratios.append(position_error(one.methods[DIAGNOSED]) / rival if isfinite(rival) else 0.0)
+    median = float(np.median(ratios))
+    met = "yes" if median <= 0.8 else "no"
+    rows.append(f"| second logs: position after 60 s at most 0.8 of the best rival's | {met} | median {median:.2f} |")
+    return rows
+
+
+def _best(results: Sequence[TransferResult], name: str, measure: Any) -> list[bool]:
+    out = []
+    for one in results:
+        least = min(measure(score) for score in one.methods.values())
+        out.append(measure(one.methods[name]) <= NEAR * least if isfinite(least) else True)
+    return out
+
+
+def _result(plain: Mapping[str, Any]) -> TransferResult:
+    return TransferResult.from_json({name: value for name, value in plain.items() if name != "cell"})

@@ -1,0 +1,54 @@
+"""Scores on second logs: which model is best, and what one that diverges counts."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from ferryid.validation.records import DIAGNOSED, TransferResult, TransferScore
+from tests.rivals.second_logs import FIT, cases, force_error, position_error, section, targets
+
+
+def score(force: float | None, position_m: float | None, diverged: int = 0) -> TransferScore:
+    return TransferScore(dict.fromkeys(("surge", "sway", "yaw"), force), position_m, 0.1, 60, diverged)
+
+
+def result(**methods: TransferScore) -> dict[str, Any]:
+    named = {DIAGNOSED: methods["ours"], FIT: methods["fit"], "stepwise": methods["stepwise"]}
+    return {"cell": "wind", **TransferResult(score(100.0, 4.0), named).to_json()}
+
+
+FOUND = [
+    result(ours=score(0.5, 1.0), fit=score(0.6, 0.5), stepwise=score(0.9, 2.0)),
+    result(ours=score(0.52, 3.0), fit=score(0.5, 3.0), stepwise=score(0.7, 0.1, diverged=2)),
+    result(ours=score(0.9, 3.0), fit=score(0.8, 2.9), stepwise=score(0.3, 2.0)),
+]
+
+
+def test_a_run_that_diverges_and_a_model_that_is_not_there_count_as_infinite() -> None:
+    assert position_error(score(0.5, 0.1, diverged=1)) == float("inf")
+    assert position_error(score(0.5, None)) == float("inf")
+    assert force_error(score(None, 1.0)) == float("inf")
+    assert force_error(score(0.4, 1.0)) == pytest.approx(0.4)
+
+
+def test_aims_compare_with_rivals_and_the_best_with_all() -> None:
+    force, free_run, ratio = targets(FOUND)
+    # 0.52 is within 5 % of 0.5; 0.9 of 0.3 is not.
+    assert "| no | 67 % of 3 logs |" in force
+    # fit is better in the first log, and beaten by nobody in the second; stepwise wins the third.
+    assert "| no | 33 % of 3 logs |" in free_run
+    # 1.0 / 2.0, no rival that did not diverge, 3.0 / 2.0.
+    assert "| yes | median 0.50 |" in ratio
+
+
+def test_the_table_has_every_model() -> None:
+    text = "\n".join(section(FOUND))
+    assert "| diagnosed and learnt (`diagnose`) | 0.52 | 0.75 | 67 % | 33 % | 0 |" in text
+    assert "| stepwise | 0.70 | 0.50 | 33 % | 33 % | 1 |" in text
+
+
+def test_the_draw_is_the_same_every_time() -> None:
+    assert [one.name for one in cases()[:3]] == ["000", "001", "002"]
+    assert len({one.cell for one in cases()[:20]}) > 10
