@@ -28,6 +28,7 @@ SECTIONS = {
     "planning": _PLAN,
     "regression": _FIT,
     "report": _MODEL,
+    "report.plan_report": _PLAN,
     "reproduce": _PROOF,
     "signals": _LOG,
     "signals.time_ranges": _RANGE,

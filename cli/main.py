@@ -135,7 +135,7 @@ def _open_streams() -> None:
 def _usage(error: TyperException) -> int:
     """Show wrong use of the command line in one line; asking for nothing at all shows the help."""
     from ferryid.cli.error_pages import OPTION, see
-    from ferryid.errors import one_line, printable
+    from ferryid.errors import ended, one_line, printable
 
     message = error.format_message() if hasattr(error, "format_message") else str(error)
     if "\n" in message:
@@ -143,5 +143,5 @@ def _usage(error: TyperException) -> int:
         return 2
     context = getattr(error, "ctx", None)
     command = context.command_path if context else "ferryid"
-    sys.stderr.write(f"ferryid: {one_line(message.rstrip('.'))}. Fix: see {command} --help{see(OPTION)}\n")
+    sys.stderr.write(f"ferryid: {ended(one_line(message))} Fix: see {command} --help{see(OPTION)}\n")
     return 2

@@ -702,13 +702,14 @@ def plan(
     origin: tuple[float, float] | None = None,
     bearing_deg: float = 0.0,
     seed: int = 1,
+    name: str = "",
     overwrite: bool = False,
     verify: bool = False,
     ranges: Ranges = (),
     progress: Progress = _quiet,
     announce: Progress = _quiet,
 ) -> Outcome:
-    """Design the trial that would tell most about a vessel, and write it to ``plans/<vessel>`` of the output folder.
+    """Design the trial that would tell most about a vessel, and write it to ``plans/<name>`` of the output folder.
 
     Parameters
     ----------
@@ -728,6 +729,8 @@ def plan(
         Latitude and longitude of the middle of the area [deg], for a mission; bearing of its longer side from north [deg].
     seed
         Of the simulated noise.
+    name
+        Of the plan; the vessel's where empty.
     overwrite
         Replace an earlier plan.
     """
@@ -747,7 +750,7 @@ def plan(
     settings = PlanSettings(minutes, area, tuple(separate), known, seed)
     outcome = plan_and_report(
         profile, paths, settings, _context(out, progress, verify, ranges),
-        origin=origin, bearing_deg=bearing_deg, overwrite=overwrite,
+        origin=origin, bearing_deg=bearing_deg, name=name, overwrite=overwrite,
     )  # fmt: skip
     progress("")
     return outcome

@@ -59,6 +59,11 @@ def printable(text: str, keep: str = "") -> str:
     )
 
 
+def ended(sentence: str) -> str:
+    """Return a sentence with its full stop, unless it ends in a mark of its own."""
+    return sentence if sentence.endswith((".", "?", "!")) else f"{sentence}."
+
+
 _MOST_OPTIONS = 5000
 """More names are not searched for the nearest: no vessel has so many topics, and it would take minutes."""
 

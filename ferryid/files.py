@@ -72,7 +72,7 @@ _UNPRINTABLE = "[\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ud800-\u
 
 
 @contextmanager
-def replacing(path: Path, *, new: bool = False) -> Iterator[Path]:
+def replacing(path: Path, *, new: bool = False, by: str = "--out") -> Iterator[Path]:
     """Give a temporary name beside `path` and rename it over `path` when the block ends without an error.
 
     The block may create a file or a folder under the temporary name. An interrupt or an error removes it. At the end the
@@ -84,6 +84,8 @@ def replacing(path: Path, *, new: bool = False) -> Iterator[Path]:
         Where the result goes.
     new
         True replaces nothing, not even what another process has put there meanwhile.
+    by
+        The option that names another place.
 
     Raises
     ------
@@ -110,7 +112,7 @@ def replacing(path: Path, *, new: bool = False) -> Iterator[Path]:
         draft.remove()
         sync(path.parent)
     except OSError as error:
-        raise unwritable(path, error) from error
+        raise unwritable(path, error, by) from error
     finally:
         draft.remove()
         _unfinished.pop(key, None)
@@ -337,12 +339,13 @@ def _remove(path: Path) -> None:
         path.unlink(missing_ok=True)
 
 
-def unwritable(path: Path, error: OSError) -> UnwritableError:
-    """Return the error that says why `path` cannot be written and what helps."""
+def unwritable(path: Path, error: OSError, by: str = "--out") -> UnwritableError:
+    """Return the error that says why `path` cannot be written and what helps, `by` the option that names another place."""
+    what = "folder" if by == "--out" else "place"
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return UnwritableError(f"{path}: the disk is full. Fix: free some space, or choose another folder with --out")
+        return UnwritableError(f"{path}: the disk is full. Fix: free some space, or choose another {what} with {by}")
     reason = error.strerror or type(error).__name__
-    return UnwritableError(f"{path}: cannot be written, {reason}. Fix: choose a folder you may write to with --out")
+    return UnwritableError(f"{path}: cannot be written, {reason}. Fix: choose a {what} you may write to with {by}")
 
 
 def taken(path: Path) -> FerryIdError:
@@ -350,16 +353,16 @@ def taken(path: Path) -> FerryIdError:
     return FerryIdError(f"{path}: exists already. Fix: choose another name, or replace it with --overwrite")
 
 
-def write_text(path: Path, text: str) -> None:
-    """Write a text file in one step: it is there whole, or not at all."""
-    with replacing(path) as temporary:
+def write_text(path: Path, text: str, *, by: str = "--out") -> None:
+    """Write a text file in one step: it is there whole, or not at all; `by` as of `replacing`."""
+    with replacing(path, by=by) as temporary:
         # A file's name may hold bytes that are no characters.
         temporary.write_text(text, encoding="utf-8", errors="backslashreplace")
 
 
-def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file in one step: it is there whole, or not at all."""
-    with replacing(path) as temporary:
+def write_bytes(path: Path, content: bytes, *, by: str = "--out") -> None:
+    """Write a file in one step: it is there whole, or not at all; `by` as of `replacing`."""
+    with replacing(path, by=by) as temporary:
         temporary.write_bytes(content)
 
 
@@ -375,7 +378,7 @@ def check_result(path: Path) -> bool:
         special = path.exists() and not path.is_file()
         other = path.is_file() and path.suffix != ".json" and path.stat().st_size > 0
     except OSError as error:
-        raise unwritable(path, error) from error
+        raise unwritable(path, error, "--json") from error
     if path.is_dir() or other:
         raise FerryIdError(
             f"{path}: is there already and no JSON file, so it is not written over. Fix: give --json another name"
@@ -392,13 +395,13 @@ def write_result(path: Path, text: str) -> None:
         When the place holds anything but an earlier JSON file, or cannot be written.
     """
     if not check_result(path):
-        write_text(path.resolve() if path.is_symlink() else path, text)
+        write_text(path.resolve() if path.is_symlink() else path, text, by="--json")
         return
     try:
         with path.open("w", encoding="utf-8") as device:
             device.write(text)
     except OSError as error:
-        raise unwritable(path, error) from error
+        raise unwritable(path, error, "--json") from error
 
 
 @contextmanager

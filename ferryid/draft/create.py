@@ -82,7 +82,7 @@ def new_profile(
     answers = Answers(named, values)
     draft, text = answered(draft, answers), draft_text(draft, answers)
     if str(place) != "-":
-        with replacing(place, new=not overwrite) as temporary:
+        with replacing(place, new=not overwrite, by="--file") as temporary:
             temporary.write_text(text, encoding="utf-8")
     return as_json(draft, str(place), text), as_text(draft, str(place), text), text
 

@@ -118,12 +118,12 @@ def export_log(
         told = told_by(diagnosis, found, float(motion.t[-1]))
         streams.append(diagnostics(told, track.t0_ns, profile.name))
     _check_any(streams, prepared)
-    with replacing(mcap, new=not overwrite) as temporary:
+    with replacing(mcap, new=not overwrite, by="--mcap") as temporary:
         write_mcap(streams, temporary, CHUNK_BYTES)
     topics = [one.topic for one in streams]
     layouts = layout_files(mcap)
     for place, text in zip(layouts, (plotjuggler(topics, mcap), foxglove(topics)), strict=True):
-        write_text(place, text)
+        write_text(place, text, by="--mcap")
     return {
         "schema": SCHEMA,
         "kind": "log",

@@ -58,13 +58,14 @@ def export_model(
     model = load_file(source)
     name = identifier(model.name, model.version)
     place = file or out / FOLDER / f"{name}{form.suffix}"
+    _check_suffix(place, form)
     if form.names_file:
         name = _name_of(place, form)
     one = exported(model, hashlib.sha256(source.read_bytes()).hexdigest(), name)
     text = form.render(one)
     content = text.encode() if isinstance(text, str) else text
     _check_place(place, source, content, overwrite=overwrite or file is None)
-    write_bytes(place, content)
+    write_bytes(place, content, by="--out" if file is None else "--file")
     checked = None if form.check is None else form.check(one, str(text))
     return {
         "schema": SCHEMA,
@@ -114,6 +115,17 @@ def chosen(to: str) -> Format:
     return formats()[to]
 
 
+def _check_suffix(place: Path, form: Format) -> None:
+    """Refuse a name that says that a file is of another form."""
+    name = place.name.lower()
+    other = next((one for one in formats().values() if name.endswith(one.suffix)), form)
+    if not name.endswith(form.suffix) and other is not form:
+        raise FerryIdError(
+            f"{place}: {other.suffix} is the suffix of {other.title}, and --to {form.name} writes {form.title}. "
+            f"Fix: end --file in {form.suffix}, or give --to {other.name}"
+        )
+
+
 def _name_of(place: Path, form: Format) -> str:
     """Return what a function in a file has to be called."""
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,62}", place.stem) or place.suffix != form.suffix:
@@ -138,7 +150,7 @@ def _check_place(place: Path, source: Path, content: bytes, *, overwrite: bool) 
         if not overwrite and place.read_bytes() != content:
             raise taken(place)
     except OSError as error:
-        raise unwritable(place, error) from error
+        raise unwritable(place, error, "--file") from error
 
 
 def _effects(one: Exported) -> list[dict[str, Any]]:

@@ -210,6 +210,27 @@ class Plan:
         return float(np.median([one.planned / one.usual for one in self.hull]))
 
 
+def check_request(profile: Profile, settings: PlanSettings) -> Profile:
+    """Return the vessel with the hull that is planned with, before anything is read or simulated.
+
+    Raises
+    ------
+    FerryIdError
+        For times, models, effects and vessels that make no trial.
+    """
+    settings.check()
+    profile = _believed(profile, settings.model)
+    if not profile.actuators:
+        raise FerryIdError(
+            f"{profile.path}: a plan is made of motion by the actuators, found none in the profile. "
+            "Fix: describe them in [[actuator]] and map their signals"
+        )
+    for pair in settings.separate:
+        for name in pair:
+            _key(name, profile)
+    return profile
+
+
 def plan(profile: Profile, logs: Sequence[str], settings: PlanSettings, run: RunContext) -> Plan:
     """Return the trial that would tell most of a vessel.
 
@@ -231,13 +252,7 @@ def plan(profile: Profile, logs: Sequence[str], settings: PlanSettings, run: Run
     FerryIdError
         For a vessel that cannot be simulated, an area without room, and settings that make no trial.
     """
-    settings.check()
-    profile = _believed(profile, settings.model)
-    if not profile.actuators:
-        raise FerryIdError(
-            f"{profile.path}: a plan is made of motion by the actuators, found none in the profile. "
-            "Fix: describe them in [[actuator]] and map their signals"
-        )
+    profile = check_request(profile, settings)
     known, pairs = _recorded(profile, logs, settings, run)
     with TemporaryDirectory() as folder:
         keys = frozenset(key for pair in pairs for key in pair)

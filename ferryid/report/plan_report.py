@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ferryid.errors import FerryIdError
-from ferryid.planning import PlanSettings, as_json, as_text, check_place, plan, write_plan
+from ferryid.models.store import NAME
+from ferryid.planning import PlanSettings, as_json, as_text, check_place, check_request, plan, write_plan
 from ferryid.report.outcome import Outcome
 from ferryid.report.plan_figures import picture
 from ferryid.simulate.control.allocation import pushes_every_way
@@ -22,9 +23,10 @@ def plan_and_report(
     *,
     origin: tuple[float, float] | None = None,
     bearing_deg: float = 0.0,
+    name: str = "",
     overwrite: bool = False,
 ) -> Outcome:
-    """Plan a trial and write its files to ``plans/<vessel>`` of the output folder.
+    """Plan a trial and write its files to ``plans/<name>`` of the output folder.
 
     Parameters
     ----------
@@ -32,13 +34,25 @@ def plan_and_report(
         As of `ferryid.planning.plan.plan`.
     origin, bearing_deg, overwrite
         As of `ferryid.planning.waypoints.write_plan`.
+    name
+        Of the plan; the vessel's where empty.
     """
-    folder = Path(run.out) / "plans" / profile.name
-    check_place(folder, origin, bearing_deg=bearing_deg, overwrite=overwrite)
+    if run.ranges and not logs:
+        raise FerryIdError(
+            "--from, --to: select a part of recordings, found no --after. Fix: give --after LOG, or leave them out"
+        )
+    if name and not NAME.fullmatch(name):
+        raise FerryIdError(
+            f"--name: {name[:80]!r} cannot name a plan. Fix: use up to 80 letters, digits, points, dashes or underscores"
+        )
+    # What is wrong whatever the place holds comes first.
+    check_request(profile, settings)
     if (origin is not None or bearing_deg) and not pushes_every_way(profile.actuators):
         raise FerryIdError(
             f"--origin, --bearing: {profile.name} steers and gets orders, not a path on a chart. Fix: leave them out"
         )
+    folder = Path(run.out) / "plans" / (name or profile.name)
+    check_place(folder, origin, bearing_deg=bearing_deg, overwrite=overwrite)
     found = plan(profile, logs, settings, run)
     run.progress("writing the plan")
     told = write_plan(

@@ -19,6 +19,7 @@ from ferryid.report.html import template
 from ferryid.report.interactive import Interactive, make_interactive
 from ferryid.report.structure import envelope
 from ferryid.report.timeline import Timeline
+from ferryid.signals.time_ranges import RangeError
 from ferryid.types import RunContext
 from ferryid.vessel.profile import Profile
 
@@ -53,12 +54,12 @@ def shown_where_refused(
     Raises
     ------
     FerryIdError
-        That of `work`. Where it is about the logs or the signal map, it names the page; a page that cannot be written, or a log
-        that cannot be opened, leaves the error as it was.
+        That of `work`. Where it is about the logs or the signal map, it names the page; a page that cannot be written, a log
+        that cannot be opened, and a range that it does not have leave the error as it was.
     """
     try:
         return work()
-    except UnwritableError:
+    except (UnwritableError, RangeError):
         raise
     except FerryIdError as error:
         try:

@@ -30,7 +30,7 @@ from ferryid.signals.prepare import track_of
 from ferryid.signals.recording import log_name, make_recording, selected
 from ferryid.signals.render import render_inspect
 from ferryid.signals.thresholds import SIGNALS
-from ferryid.signals.time_ranges import cut
+from ferryid.signals.time_ranges import RangeError, cut
 from ferryid.signals.track import LeftOut
 from ferryid.types import TimeRanges
 from ferryid.vessel.choice import named_profiles
@@ -67,7 +67,7 @@ def inspect(
     Raises
     ------
     FerryIdError
-        For a log that cannot be opened.
+        For a log that cannot be opened, and a range that it does not have.
     """
     reader = open_log(path, profile.table if profile is not None else None)
     with ThreadPoolExecutor(1) as pool:
@@ -220,6 +220,8 @@ def _vessel(
             left_out = opened.measured.left_out
             used = int(np.count_nonzero(opened.measured.usable))
             told += [*opened.doubts, *rows_left_out(left_out, used + sum(one.rows for one in left_out))]
+        except RangeError:
+            raise
         except FerryIdError as error:
             usable, problem = False, problem or str(error)
     return {

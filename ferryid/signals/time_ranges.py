@@ -25,6 +25,11 @@ _DAY_S = 86400.0
 USED = "Used is"
 """How the note on a recording that was cut begins."""
 
+
+class RangeError(FerryIdError):
+    """A range that a log does not have: a fault of the options, whatever the log holds."""
+
+
 Spans = tuple[tuple[int, int], ...]
 """First and last time of each range [ns], in order and apart."""
 
@@ -102,9 +107,11 @@ def cut(recording: Recording, profile: Profile, ranges: TimeRanges) -> Recording
 
     Raises
     ------
+    RangeError
+        For a range outside the log or that ends before it begins, and a clock time of a log whose times are counted from its
+        start.
     FerryIdError
-        For a range outside the log or that ends before it begins, a clock time of a log whose times are counted from its
-        start, and where a needed signal has no value in the ranges.
+        Where a needed signal has no value in the ranges.
     """
     if not ranges:
         return recording
@@ -125,7 +132,7 @@ def spans_of(log: str, start: int, end: int, ranges: TimeRanges) -> Spans:
 
     Raises
     ------
-    FerryIdError
+    RangeError
         As `cut`.
     """
     found = []
@@ -133,12 +140,12 @@ def spans_of(log: str, start: int, end: int, ranges: TimeRanges) -> Spans:
         first = _placed(log, (start, end), asked[0], start, start)
         last = _placed(log, (start, end), asked[1], end, max(first, start))
         if last < start or first > end:
-            raise FerryIdError(
+            raise RangeError(
                 f"{log}: the range {_words(asked)} is outside the log, which is {(end - start) * 1e-9:.1f} s long"
                 f"{_clock(start, end)}. Fix: correct --from and --to"
             )
         if first >= last:
-            raise FerryIdError(
+            raise RangeError(
                 f"{log}: the range {_words(asked)} ends before it begins, found {_relative(first, start)} to "
                 f"{_relative(last, start)} of the log. Fix: correct --from and --to"
             )
@@ -163,7 +170,7 @@ def _placed(log: str, whole: tuple[int, int], time: str | float | None, default:
         return (end if math.copysign(1.0, seconds) < 0.0 else start) + round(seconds * 1e9)
     date, clock = _date(text), _CLOCK.fullmatch(text)
     if start < SIGNALS.epoch_ns and (date or clock):
-        raise FerryIdError(
+        raise RangeError(
             f"{log}: its times are counted from its start, so that {text} is at no place in it. "
             "Fix: give --from and --to in seconds"
         )
@@ -175,7 +182,7 @@ def _placed(log: str, whole: tuple[int, int], time: str | float | None, default:
         # Before midnight and after it are one trial.
         return placed if placed >= after - 1_000_000_000 else placed + round(_DAY_S * 1e9)
     if date is None:
-        raise FerryIdError(f"--from, --to: {text!r} is no time. Fix: give seconds, or a clock time in UTC")
+        raise RangeError(f"--from, --to: {text!r} is no time. Fix: give seconds, or a clock time in UTC")
     return round((date - datetime(1970, 1, 1, tzinfo=UTC)) / timedelta(microseconds=1)) * 1000
 
 

@@ -90,19 +90,31 @@ def choose_vessel(
     Raises
     ------
     FerryIdError
-        For a profile with a fault, logs of two vessels, and logs that several profiles fit, or none.
+        For a profile with a fault, unless that of the model serves, logs of two vessels, and logs that several profiles fit, or
+        none.
     """
     if isinstance(vessel, Profile):
         return VesselChoice(vessel)
     if vessel is not None and str(vessel):
         return VesselChoice(load_profile(vessel), str(vessel))
     paths = [str(log) for log in logs]
-    stated = stated_choice(paths)
-    if own is not None:
-        if stated is None or stated.profile.sha256 == own.sha256 or all(_match(own, log).fits for log in paths):
-            return VesselChoice(own)
-        return stated
-    return stated or _fitting(paths)
+    if own is None:
+        return stated_choice(paths) or _fitting(paths)
+    fault: FerryIdError | None = None
+    stated: VesselChoice | None = None
+    try:
+        stated = stated_choice(paths)
+    except FerryIdError as error:
+        # It is not needed where the model's own profile serves.
+        fault = error
+    if stated is not None and stated.profile.sha256 == own.sha256:
+        return VesselChoice(own)
+    if (stated is None and fault is None) or all(_match(own, log).fits for log in paths):
+        return VesselChoice(own)
+    if stated is None:
+        assert fault is not None
+        raise fault
+    return stated
 
 
 def stated_choice(logs: Sequence[str], *, environment: bool = True) -> VesselChoice | None:

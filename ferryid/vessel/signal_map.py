@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ferryid.counts import counted, verb
-from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.errors import FerryIdError, did_you_mean, ended
 from ferryid.ingest.log import Loss, Series, Topic
 from ferryid.types import Floats
 from ferryid.vessel.elements import TEXT_TYPES, array_fault, element_fields, has_element, picked
@@ -159,10 +159,10 @@ def select(profile: Profile, topics: Sequence[Topic], where: str, losses: Sequen
         reason = selection.missing[signal.quantity].removesuffix(".")
         if _topic(signal.topic, topics) is None:
             there = _some([topic.name for topic in topics]) or "no topic"
-            reason += f"{'' if reason.endswith('?') else '.'} The log has {there}"
+            reason = f"{ended(reason)} The log has {there}"
         raise FerryIdError(
             f"{where}: {signal.quantity} is needed by the profile {profile.name} ({profile.path}:{signal.line}), "
-            f"{reason}{more}. Fix: correct the signal map, or set "
+            f"{ended(f'{reason}{more}')} Fix: correct the signal map, or set "
             "required = false where the signal can be missed"
         )
     return selection

@@ -22,6 +22,7 @@ def refused(run, *parts: str) -> None:
     assert len(lines) == 1, run.err
     assert lines[0].startswith("ferryid: ")
     assert "Fix:" in lines[0]
+    assert "?." not in lines[0]
     assert "Traceback" not in run.err
     for part in parts:
         assert part in lines[0], lines[0]
@@ -343,6 +344,7 @@ def test_signals_that_contradict_each_other(
 @pytest.mark.parametrize("arguments", [(), ("fit",), ("fitt", "x"), ("fit", "--no-such")])
 def test_wrong_use_is_told_shortly(ferryid, arguments: tuple[str, ...]) -> None:
     run = ferryid(*arguments)
+    assert "?." not in run.err
     assert run.code == 2
     assert run.err
     assert "Traceback" not in run.err

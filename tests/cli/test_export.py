@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from ferryid.models.store.versions import save
+from tests.cli.conftest import FIXTURES
 from tests.cli.test_bad_input import refused
 from tests.cli.test_every_command import conforms
 from tests.export.models import MODELS
@@ -103,6 +104,13 @@ def test_a_log_for_a_viewer(ferryid, fixtures: Path, out: Path, tmp_path: Path) 
         (("short.mcap", "--mcap", "v.mcap", "--file", "v.h"), "--file: is for a model"),
         (("missing.mcap", "--mcap", "v.mcap", "--vessel", "milliampere"), "missing.mcap"),
         (("milliampere", "--to", "matlab", "--file", "my-boat.m"), "my-boat.m"),
+        (("milliampere", "--to", "gazebo", "--file", "d/x.fmu"), ".fmu is the suffix of an FMU"),
+        (("milliampere", "--to", "px4", "--file", "x.gazebo.sdf"), "or give --to gazebo"),
+        (
+            (str(FIXTURES / "short.mcap"), "--to", "gazebo"),
+            "short.mcap: is a log (MCAP), where a model file (JSON) is wanted",
+        ),
+        (("milliampere", "--to", "c", "--file", "/proc/none/x.h"), "a place you may write to with --file"),
         (("milliampere", "--to", "c", "--file", "x.json", "--json", "x.json"), "two files"),
     ],
 )

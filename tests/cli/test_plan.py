@@ -32,7 +32,7 @@ def test_a_path_for_a_vessel_that_pushes_every_way(ferryid: Command, tmp_path: P
         "--bearing",
         "90",
     )
-    run = ferryid(*words, "--out", tmp_path, "--json", "-")
+    run = ferryid(*words, "--name", "milliampere", "--out", tmp_path, "--json", "-")
     assert run.code == 0, run.err
     found = conforms(run.out)
     assert found["duration_s"] <= 360.0
@@ -84,6 +84,8 @@ def test_orders_for_a_vessel_that_steers(ferryid: Command, tmp_path: Path) -> No
         (("--vessel", "milliampere", "--separate", "wnd,current"), ('no effect "wnd"', 'Did you mean "wind"')),
         (("--vessel", "milliampere", "--separate", "thruster_gain(bow),wind"), ('no actuator "bow"', "thruster1")),
         (("--after", "absent.mcap"), ("absent.mcap", "no such file")),
+        (("--vessel", "milliampere", "--from", "3"), ("--from, --to: select a part of recordings, found no --after",)),
+        (("--vessel", "milliampere", "--name", "../x"), ("--name: '../x' cannot name a plan",)),
     ],
 )
 def test_input_that_makes_no_plan(
@@ -91,3 +93,18 @@ def test_input_that_makes_no_plan(
 ) -> None:
     refused(ferryid("plan", *options, "--out", tmp_path), *parts)
     assert not (tmp_path / "plans").exists()
+
+
+def test_a_plan_that_is_there_stays_and_options_are_looked_at_first(ferryid: Command, tmp_path: Path) -> None:
+    for name in ("milliampere", "tuesday"):
+        (tmp_path / "plans" / name).mkdir(parents=True)
+        (tmp_path / "plans" / name / "plan.csv").write_text("kept", encoding="utf-8")
+    words = ("plan", "--vessel", "milliampere", "--out", tmp_path)
+    refused(
+        ferryid(*words),
+        "milliampere/plan.csv: exists already. Fix: choose another name, or replace it with --overwrite",
+    )
+    refused(ferryid(*words, "--name", "tuesday"), "tuesday/plan.csv: exists already")
+    refused(ferryid(*words, "--minutes", "0.5"), "--minutes: a plan takes")
+    refused(ferryid(*words, "--separate", "wnd,current"), 'no effect "wnd"')
+    assert (tmp_path / "plans" / "tuesday" / "plan.csv").read_text(encoding="utf-8") == "kept"

@@ -74,10 +74,13 @@ def test_bad_ranges_end_in_one_line(ferryid, fixtures: Path, tmp_path: Path) -> 
         (("--from", "50", "--to", "20"), "ends before it begins"),
         (("--from", "noon"), "'noon' is no time"),
     ):
-        run = ferryid("fit", log, *BOAT, *options, "--out", out)
-        assert run.code == 2
-        assert told in run.err
-        assert run.err.count("\n") == 1
+        for command in (("fit", log, *BOAT, "--out", out), ("inspect", log, *BOAT)):
+            run = ferryid(*command, *options)
+            assert (run.code, run.out) == (2, "")
+            assert told in run.err
+            assert run.err.count("\n") == 1
+    # A fault of the options has no page on what the log holds.
+    assert not (out / "reports").exists()
     assert ferryid("fit", "--archive", *BOAT, "--from", "3", "--out", out).code == 2
     assert ferryid("export", "milliampere", "--to", "c", "--from", "3", "--out", out).code == 2
 

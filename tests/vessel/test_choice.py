@@ -192,6 +192,14 @@ def test_beside_a_model_its_own_profile_serves_where_it_can(log: Path) -> None:
     assert choose_vessel([log], own=revolt).profile is revolt
 
 
+def test_a_fault_beside_the_log_matters_only_where_the_profile_of_the_model_does_not_serve(log: Path) -> None:
+    (log.parents[1] / "vessel.toml").write_text("name = \n", encoding="utf-8")
+    own = load_profile("milliampere")
+    assert choose_vessel([log], own=own).profile is own
+    with pytest.raises(FerryIdError, match=r"vessel\.toml:1: not valid TOML"):
+        choose_vessel([log], own=load_profile("revolt"))
+
+
 FOLDERS = {
     "esso-osaka": "esso_osaka/*/*.csv",
     "gunnerus": "gunnerus/*.csv",

@@ -3,6 +3,7 @@
 from ferryid.models.store.history import Change, read_history
 from ferryid.models.store.listing import list_versions
 from ferryid.models.store.versions import (
+    NAME,
     StoredModel,
     assign_version,
     check_name,
@@ -17,6 +18,7 @@ from ferryid.models.store.versions import (
 )
 
 __all__ = [
+    "NAME",
     "Change",
     "StoredModel",
     "assign_version",

@@ -209,6 +209,8 @@ def load_file(path: Path) -> Model:
                 f"its {counted(len(text), 'byte')} {verb(len(text), 'holds')} nothing, as after a loss of power"
             )
         data = json.loads(text)
+    except UnicodeDecodeError as error:
+        raise FerryIdError(f"{path}: {_binary(path)}, where a model file (JSON) is wanted. {NO_MODEL}") from error
     # Thousands of brackets, or of digits, end in errors of Python rather than of JSON.
     except (OSError, ValueError, RecursionError) as error:
         raise FerryIdError(
@@ -218,6 +220,22 @@ def load_file(path: Path) -> Model:
     if not isinstance(data, dict):
         raise FerryIdError(f"{path}: not a ferryid model, but a JSON list or value. Fix: give a file of ferryid fit")
     return model_from_json(data, str(path))
+
+
+NO_MODEL = (
+    "Fix: give the name or the file of a model; logs stand after it (ferryid evaluate MODEL LOG), and to export one needs "
+    "--mcap FILE"
+)
+
+
+def _binary(path: Path) -> str:
+    """Return what a file that is no text is."""
+    from ferryid.ingest import supported_formats
+
+    with path.open("rb") as file:
+        head = file.read(64)
+    name = next((one.name for one in supported_formats() if one.matches(path, head)), "")
+    return f"is a log ({name})" if name else "is no text"
 
 
 def list_models(out: Path) -> list[StoredModel | UnreadableModel]:
