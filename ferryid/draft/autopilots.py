@@ -1,4 +1,4 @@
-"""What the autopilots PX4 and ArduPilot order of motors and servos: the names are theirs, the boat's are not in their logs."""
+"""What the autopilots PX4 and ArduPilot record: the names are theirs, the boat's are not in their logs."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ferryid.draft.actuator_fields import ActuatorField
-from ferryid.draft.fields import rate_of
+from ferryid.draft.fields import FieldGroup, rate_of
 from ferryid.draft.samples import Samples
 from ferryid.ingest.log import Topic
 
@@ -20,6 +20,24 @@ _ORDERS = (
 )
 """Topic, field, number of the first, name and role of what autopilots order."""
 _MOST = 16
+
+
+_ARRAYS = (
+    ("vehicle_attitude", "heading", ("q[1]", "q[2]", "q[3]", "q[0]"), "quaternion"),
+    ("vehicle_angular_velocity", "yaw_rate", ("xyz[2]",), ""),
+)
+"""Topics of PX4 that are arrays without names of their elements: what they are. Its quaternions begin with the scalar."""
+
+
+def autopilot_groups(topics: Sequence[Topic]) -> list[FieldGroup]:
+    """Return attitude and yaw rate of PX4; nothing for a log of something else."""
+    by_name = {topic.name.strip("/"): topic for topic in topics if topic.encoding == "ulog" and topic.count > 1}
+    return [
+        FieldGroup(kind, topic.name, fields, form, rate_of(topic))
+        for name, kind, fields, form in _ARRAYS
+        for topic in [by_name.get(name)]
+        if topic is not None and set(fields) <= topic.fields.keys()
+    ]
 
 
 def autopilot_fields(topics: Sequence[Topic]) -> list[ActuatorField]:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ferryid.draft.actuator_fields import actuator_fields, parted, shared_topics
 from ferryid.draft.actuators import UNKNOWN_ORDER, DraftedActuator, drafted_actuators
-from ferryid.draft.autopilots import autopilot_fields, moving
+from ferryid.draft.autopilots import autopilot_fields, autopilot_groups, moving
 from ferryid.draft.fields import navigation_groups
 from ferryid.draft.kinematics import navigation_signals
 from ferryid.draft.mapped import MappedSignal
@@ -40,6 +40,8 @@ class Draft:
         How the log was read, as sentences.
     unused
         Topics of which nothing is mapped.
+    unused_fields
+        Of topics of which something is mapped: the further columns of a table, and fields that look like an actuator's.
     """
 
     log: str
@@ -48,6 +50,7 @@ class Draft:
     like: Profile | None
     notes: tuple[str, ...]
     unused: tuple[str, ...]
+    unused_fields: tuple[tuple[str, str], ...] = ()
 
     @property
     def every(self) -> tuple[MappedSignal, ...]:
@@ -76,7 +79,8 @@ def draft_profile(log: str | Path, like: Profile | None = None, ranges: TimeRang
     reader = open_log(log, None if like is None else like.table)
     topics = reader.topics
     autopilot = autopilot_fields(topics)
-    groups, fields, winds = navigation_groups(topics), autopilot or actuator_fields(topics), wind_fields(topics)
+    groups = [*navigation_groups(topics), *autopilot_groups(topics)]
+    fields, winds = autopilot or actuator_fields(topics), wind_fields(topics)
     if not groups and not fields and any("named by their place" in topic.note for topic in topics):
         raise FerryIdError(
             f"{log}: its columns have no names, so that nothing shows what they are. Fix: add a header row, or give --like a "
@@ -122,8 +126,35 @@ def draft_profile(log: str | Path, like: Profile | None = None, ranges: TimeRang
     notes = tuple(
         dict.fromkeys(note for topic in topics if topic.name in used for note in topic.note.split("; ") if note)
     )
+    mapped = [*every, *(signal for one in actuators for signal in one.signals)]
     return Draft(
-        str(log), tuple(every), tuple(actuators), like, notes, tuple(t.name for t in topics if t.name not in used)
+        str(log),
+        tuple(every),
+        tuple(actuators),
+        like,
+        notes,
+        tuple(t.name for t in topics if t.name not in used),
+        _left_over([t for t in topics if t.name in used], mapped, {(one.topic, one.path) for one in fields}, like),
+    )
+
+
+def _left_over(
+    topics: Sequence[Topic],
+    mapped: Sequence[MappedSignal],
+    of_actuators: set[tuple[str, str]],
+    like: Profile | None,
+) -> tuple[tuple[str, str], ...]:
+    """Return topic and field of what is not mapped, though its topic is: a table's columns, and fields of actuators."""
+    taken = {(one.topic, path) for one in mapped for path in (*one.fields, *(name for name, _ in one.where))}
+    table = None if like is None else like.table
+    times = set() if table is None else {table.time, *table.stamp}
+    # The columns that a time was guessed from stand in the note of their table.
+    taken |= {(t.name, path) for t in topics for path in t.fields if path in times or f'"{path}"' in t.note}
+    return tuple(
+        (topic.name, path)
+        for topic in topics
+        for path in topic.fields
+        if (topic.name, path) not in taken and (topic.encoding == "table" or (topic.name, path) in of_actuators)
     )
 
 

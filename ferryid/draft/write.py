@@ -111,6 +111,7 @@ def as_json(draft: Draft, file: str, text: str) -> dict[str, Any]:
             for one in draft.every
         ],
         "unused": list(draft.unused),
+        "unused_fields": [{"topic": topic, "field": path} for topic, path in draft.unused_fields],
     }
 
 
@@ -122,10 +123,19 @@ def as_text(draft: Draft, file: str, text: str) -> str:
         how = ", ".join(filter(None, [one.unit, one.frame, "sign -1" if one.sign < 0.0 else ""]))
         lines.append(f"  {one.quantity:<{wide}}  {stream_name(one.topic, one.where)}: {', '.join(one.fields)}  [{how}]")
         lines += [f"  {'':<{wide}}    check: {doubt}" for doubt in one.doubts]
+    lines += [f"  not mapped of {topic}: {', '.join(paths)}" for topic, paths in _by_topic(draft).items()]
     count = open_lines(text)
     todo = f"fill in {counted(count, 'line')} marked {MARK.removeprefix('# ').rstrip(':')}, then " if count else ""
     lines.append(f"next    {todo}ferryid vessel check {file}, ferryid inspect {draft.log}, ferryid fit {draft.log}")
     return "\n".join(lines)
+
+
+def _by_topic(draft: Draft) -> dict[str, list[str]]:
+    """Return the fields that are not mapped, by their topics."""
+    found: dict[str, list[str]] = {}
+    for topic, path in draft.unused_fields:
+        found.setdefault(topic, []).append(path)
+    return found
 
 
 def questions(draft: Draft) -> list[Question]:
@@ -204,6 +214,9 @@ def draft_text(draft: Draft, answers: Answers) -> str:
         lines += _unmapped(draft, like.actuators)
     for signal in draft.every:
         lines += _signal(signal, answers)
+    if draft.unused_fields:
+        lines += ["", "# Fields that are not mapped, of topics that are:"]
+        lines += [f"#   {topic}: {', '.join(paths)}" for topic, paths in _by_topic(draft).items()]
     if draft.unused:
         lines += ["", "# Topics of which nothing is mapped:", *(f"#   {name}" for name in draft.unused)]
     return "\n".join(lines) + "\n"

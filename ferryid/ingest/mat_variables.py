@@ -173,8 +173,9 @@ def _node(value: Any, path: str, result: MatVariables, depth: int) -> Node | Non
     if isinstance(value, MatlabFunction) or depth > _DEEPEST or not isinstance(value, np.ndarray):
         return None
     if isinstance(value, MatlabOpaque):
-        kind = value["s2"].flat[0] if "s2" in (value.dtype.names or ()) else ""
-        result.objects[path] = kind.decode("ascii", "replace") if isinstance(kind, bytes) else str(kind)
+        kind, name = _of_object(value, "s2"), _of_object(value, "s0")
+        # SciPy returns an object of its own under the name None, and with its name inside.
+        result.objects[name if path == "None" and name else path] = kind
         return None
     if value.dtype.names:
         return _structure(value, path, result, depth)
@@ -187,6 +188,11 @@ def _node(value: Any, path: str, result: MatVariables, depth: int) -> Node | Non
         return None
     array = _bare(value)
     return Leaf(array.shape, array.dtype.kind, array.dtype.name, lambda: array)
+
+
+def _of_object(value: Any, part: str) -> str:
+    text = value[part].flat[0] if part in (value.dtype.names or ()) else ""
+    return text.decode("ascii", "replace") if isinstance(text, bytes) else str(text)
 
 
 def _bare(value: np.ndarray[Any, Any]) -> Column:

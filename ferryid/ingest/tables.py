@@ -62,7 +62,8 @@ class TableReader:
 
     def __init__(self, sheets: Sequence[Sheet], losses: Sequence[Loss] = ()) -> None:
         self._sheets = {sheet.topic.name: sheet for sheet in sheets}
-        self.paths = tuple(sheet.path for sheet in sheets)
+        # A file may hold several.
+        self.paths = tuple(dict.fromkeys(sheet.path for sheet in sheets))
         self.topics = tuple(sheet.topic for sheet in sheets)
         self.losses = tuple(losses)
 

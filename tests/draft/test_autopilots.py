@@ -41,16 +41,16 @@ def trial() -> Columns:
     return made
 
 
-def px4(trial: Columns, *, actuators: bool = True) -> bytes:
+def px4(trial: Columns, *, actuators: bool = True, heading: bool = True) -> bytes:
     t = (trial["t"] * 1e6).astype(np.uint64) + 1_000_000
     single = {name: values.astype(np.float32) for name, values in trial.items()}
-    zero, heading = 0 * single["u"], (trial["psi"] + np.pi) % (2 * np.pi) - np.pi
+    zero, psi = 0 * single["u"], (trial["psi"] + np.pi) % (2 * np.pi) - np.pi
     unused = np.full((len(t), 10), np.nan)
     topics: dict[str, dict[str, Any]] = {
         "vehicle_attitude": {
             "timestamp": t,
             "timestamp_sample": t - 200,
-            "q": np.column_stack([np.cos(heading / 2), zero, zero, np.sin(heading / 2)]).astype(np.float32),
+            "q": np.column_stack([np.cos(psi / 2), zero, zero, np.sin(psi / 2)]).astype(np.float32),
             "delta_q_reset": np.zeros((len(t), 4), np.float32),
         },
         "vehicle_local_position": {
@@ -62,10 +62,10 @@ def px4(trial: Columns, *, actuators: bool = True) -> bytes:
             "vx": single["vn"],
             "vy": single["ve"],
             "vz": zero,
-            "heading": heading.astype(np.float32),
+            **({"heading": psi.astype(np.float32)} if heading else {}),
         },
         "vehicle_angular_velocity": {"timestamp": t, "xyz": np.column_stack([zero, zero, single["r"]])},
-        "vehicle_attitude_setpoint": {"timestamp": t, "yaw_body": heading.astype(np.float32)},
+        "vehicle_attitude_setpoint": {"timestamp": t, "yaw_body": psi.astype(np.float32)},
     }
     if actuators:
         motors, servos = np.c_[trial["n"] / 1000, unused], np.c_[trial["rudder"] / 0.7, unused]
@@ -108,12 +108,26 @@ def test_a_draft_from_px4(trial: Columns, tmp_path: Path) -> None:
     local = "/vehicle_local_position"
     assert shown(draft) == {
         "position": (local, ("x", "y"), "m", "NED"),
-        "heading": (local, ("heading",), "rad", "NED"),
+        "heading": ("/vehicle_attitude", ("q[1]", "q[2]", "q[3]", "q[0]"), "quaternion", "NED"),
         "velocity": (local, ("vx", "vy"), "m/s", "NED"),
+        "yaw_rate": ("/vehicle_angular_velocity", ("xyz[2]",), "rad/s", "FRD"),
         "motor1.speed.command": ("/actuator_motors", ("control[0]",), "fraction", ""),
         "motor1.rudder.command": ("/actuator_servos", ("control[0]",), "fraction", ""),
     }
     assert [(one.name, one.kind) for one in draft.actuators] == [("motor1", "propeller_rudder")]
+
+
+def test_the_attitude_of_px4_is_a_heading(trial: Columns, tmp_path: Path) -> None:
+    path = tmp_path / "boat.ulg"
+    path.write_bytes(px4(trial, heading=False))
+    draft = draft_profile(path)
+    q = ("/vehicle_attitude", ("q[1]", "q[2]", "q[3]", "q[0]"), "quaternion", "NED")
+    assert shown(draft)["heading"] == q
+    answers = Answers("boat", {one.key: one.hint for one in questions(draft)})
+    streams = record(path, parse_profile(draft_text(draft, answers), "boat.toml")).streams.values()
+    columns = {name: values for stream in streams for name, values in stream.columns.items()}
+    np.testing.assert_allclose(np.cos(columns["psi"] - trial["psi"]), 1.0, atol=1e-6)
+    np.testing.assert_allclose(columns["r"], trial["r"], atol=1e-6)
 
 
 def test_a_draft_from_ardupilot(trial: Columns, tmp_path: Path) -> None:

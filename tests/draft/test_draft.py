@@ -12,6 +12,7 @@ import pytest
 from ferryid import api
 from ferryid.draft import Answers, Draft, Question, draft_profile, draft_text, questions
 from ferryid.draft.mapped import MappedSignal
+from ferryid.draft.write import as_text
 from ferryid.errors import FerryIdError
 from ferryid.vessel import check_profile, load_profile, parse_profile
 from ferryid.vessel.profile import Profile
@@ -256,6 +257,15 @@ def test_a_propeller_with_a_rudder_is_asked_for_both(tmp_path: Path) -> None:
     profile = parse_profile(draft_text(draft, Answers("boat", values)), "boat.toml")
     assert (profile.actuators[0].kind, profile.actuators[0].rudder["x_m"]) == ("propeller_rudder", -2.0)
     assert profile.actuators[0].inflow["diameter_m"] == 1.5
+
+
+def test_columns_that_are_not_mapped_are_listed(tmp_path: Path) -> None:
+    made = in_ned(sailed())
+    draft, _ = drafted(tmp_path, {**made, "bow_temp": made["t"], "depth": made["u"]})
+    assert draft.unused_fields == (("table", "bow_temp"), ("table", "depth"))
+    text = draft_text(draft, Answers("boat"))
+    assert "# Fields that are not mapped, of topics that are:\n#   table: bow_temp, depth\n" in text
+    assert "  not mapped of table: bow_temp, depth\n" in as_text(draft, "vessel.toml", text)
 
 
 def test_actuators_that_share_a_topic(tmp_path: Path) -> None:

@@ -11,10 +11,13 @@ import h5py
 import numpy as np
 import pytest
 import scipy.io
+from scipy.io.matlab import MatlabOpaque
 
 from ferryid.errors import FerryIdError
 from ferryid.ingest import open_log
 from ferryid.ingest.log import TableLayout
+from ferryid.ingest.mat_variables import MatVariables, _node
+from ferryid.signals.inspect import inspect
 
 N = 30
 T = np.arange(N) * 0.1
@@ -188,6 +191,34 @@ def test_objects_of_matlab_are_named_with_how_to_save_them(tmp_path: Path) -> No
         FerryIdError, match=r"1 object of MATLAB \(speed: timeseries\).*s.speed = struct\('Time', speed.Time"
     ):
         open_log(path)
+
+
+def test_objects_beside_other_series_are_reported(tmp_path: Path) -> None:
+    path = as_hdf5(tmp_path, {"t": T, "u": U, "speed": np.zeros((1, 6), np.uint32)})
+    with h5py.File(path, "r+") as file:
+        file["speed"].attrs["MATLAB_class"] = np.bytes_("timeseries")
+        file["speed"].attrs["MATLAB_object_decode"] = np.int32(3)
+    reader = open_log(path)
+    assert [topic.name for topic in reader.topics] == ["table"]
+    (loss,) = reader.losses
+    assert loss.what.startswith(
+        "speed is a timeseries object of MATLAB, which only MATLAB reads. Fix: in MATLAB, s.speed ="
+    )
+
+
+def test_an_object_of_level_5_has_the_name_inside_it() -> None:
+    # As SciPy returns what MATLAB's save writes of a timeseries.
+    parts = [("s0", "O"), ("s1", "O"), ("s2", "O"), ("arr", "O")]
+    opaque = MatlabOpaque(np.array([(b"speed", b"MCOS", b"timeseries", np.zeros((6, 1), np.uint32))], parts))
+    found = MatVariables()
+    assert _node(opaque, "None", found, 0) is None
+    assert found.objects == {"speed": "timeseries"}
+
+
+def test_structures_of_one_file_are_one_file(tmp_path: Path) -> None:
+    path = saved(tmp_path, {"gps": {"t": T, "x": U}, "imu": {"t": T, "r": R}})
+    assert open_log(path).paths == (path,)
+    assert inspect(path)["format"] == "MAT file of MATLAB"
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError
-from ferryid.ingest.log import Format, TableLayout, Topic
+from ferryid.ingest.log import Format, Loss, TableLayout, Topic
 from ferryid.ingest.mat_tables import MatTable, from_datenum, tables_of
 from ferryid.ingest.mat_variables import MatVariables, read_variables
 from ferryid.ingest.table_time import TimePlan
@@ -40,7 +40,18 @@ def _open(path: Path, layout: TableLayout | None) -> TableReader:
     tables = tables_of(variables.found, layout)
     if not tables:
         raise FerryIdError(f"{path}: {_without(variables, layout)}")
-    return TableReader([_sheet(path, table) for table in tables], variables.losses)
+    return TableReader([_sheet(path, table) for table in tables], [*variables.losses, *_objects(path, variables)])
+
+
+def _objects(path: Path, variables: MatVariables) -> list[Loss]:
+    """Return what only MATLAB reads, each with how it is saved for others."""
+    return [
+        Loss(
+            str(path),
+            f"{name} is a {kind} object of MATLAB, which only MATLAB reads. Fix: in MATLAB, {_remedy(name, kind)}",
+        )
+        for name, kind in variables.objects.items()
+    ]
 
 
 def _sheet(path: Path, table: MatTable) -> MatSheet:
