@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Annotated
 
 import typer
@@ -89,6 +90,7 @@ def command(
         out,
         name=name,
         archive=archive,
+        command=("ferryid", *sys.argv[1:]),
         verify=verify,
         ranges=ranges(from_, to),
         progress=progress,

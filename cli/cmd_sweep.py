@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Annotated
 
 import typer
@@ -82,6 +83,7 @@ def command(
         windows_s=parse_windows(windows),
         folds=folds,
         archive=archive,
+        command=("ferryid", *sys.argv[1:]),
         ranges=ranges(from_, to),
         progress=progress,
         announce=tell,

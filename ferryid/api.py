@@ -149,10 +149,12 @@ def _model(model: str | Path | Model, out: Path) -> Model:
     return model if isinstance(model, Model) else load(str(model), out)
 
 
-def _context(out: str | Path, progress: Progress, verify: bool = False, ranges: Ranges = ()) -> RunContext:
+def _context(
+    out: str | Path, progress: Progress, verify: bool = False, ranges: Ranges = (), command: Sequence[str] = ()
+) -> RunContext:
     from ferryid.types import RunContext
 
-    return RunContext(Path(out), progress, verify, ranges=tuple(ranges))
+    return RunContext(Path(out), progress, verify, ranges=tuple(ranges), command=tuple(command))
 
 
 def _refuse_ranges_of_archive(ranges: Ranges) -> None:
@@ -239,6 +241,7 @@ def fit(
     *,
     name: str = "",
     archive: bool = False,
+    command: Sequence[str] = (),
     verify: bool = False,
     progress: Progress = _quiet,
     ranges: Ranges = (),
@@ -261,6 +264,8 @@ def fit(
         Name of the model in the store; the vessel's where empty.
     archive
         Fit to the sums kept of ingested logs; no log is read.
+    command
+        The words that the page says it was asked for with.
     verify
         Read whole files and check every checksum.
     announce
@@ -270,13 +275,13 @@ def fit(
     from ferryid.report.fit_report import fit_and_report, fit_archive_and_report
     from ferryid.report.refusal import shown_where_refused
 
-    settings, run, paths = settings or FitSettings(), _context(out, progress, verify, ranges), _paths(logs)
+    settings, run, paths = settings or FitSettings(), _context(out, progress, verify, ranges, command), _paths(logs)
     if archive:
         _refuse_ranges_of_archive(ranges)
         return fit_archive_and_report(_of_archive(run.out, vessel, announce), settings, run, paths, name=name)
     profile = _chosen(paths, vessel, announce)
     return shown_where_refused(
-        lambda: fit_and_report(paths, profile, settings, run, name=name), "fitted", paths, profile, run
+        lambda: fit_and_report(paths, profile, settings, run, name=name), "fitted", paths, profile, run, command
     )
 
 
@@ -362,6 +367,7 @@ def sweep(
     windows_s: Sequence[float] = (),
     folds: int | None = None,
     archive: bool = False,
+    command: Sequence[str] = (),
     progress: Progress = _quiet,
     ranges: Ranges = (),
     announce: Progress = _quiet,
@@ -375,7 +381,7 @@ def sweep(
     if archive:
         _refuse_ranges_of_archive(ranges)
     profile = _of_archive(Path(out), vessel, announce) if archive else _chosen(paths, vessel, announce)
-    arguments = (paths, profile, settings or FitSettings(), _context(out, progress, ranges=ranges))
+    arguments = (paths, profile, settings or FitSettings(), _context(out, progress, ranges=ranges, command=command))
     given = {"windows_s": windows_s, "folds": FOLDS if folds is None else folds, "archive": archive}
     if what == "basis":
         return structures_and_report(*arguments, **given)  # type: ignore[arg-type]

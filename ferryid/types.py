@@ -48,6 +48,8 @@ class RunContext:
         False reads the logs without keeping ingested tables.
     ranges
         What is used of every log; all of it where empty.
+    command
+        The words that it was asked for with, which its pages repeat.
     """
 
     out: Path
@@ -56,6 +58,7 @@ class RunContext:
     tables_out: Path | None = None
     keep_tables: bool = True
     ranges: TimeRanges = ()
+    command: Sequence[str] = ()
 
     @property
     def tables(self) -> Path | None:

@@ -14,7 +14,7 @@ from ferryid.identify import FitOutcome, FitSettings, fit_archive, fit_logs
 from ferryid.models import model_to_json
 from ferryid.models.store import StoredModel, assign_version, plan, save
 from ferryid.report.fit_timeline import fit_timeline
-from ferryid.report.folder import PAGE, write_folder
+from ferryid.report.folder import PAGE, made, write_folder
 from ferryid.report.interactive import make_interactive
 from ferryid.report.model_text import describe_settings
 from ferryid.report.outcome import Report
@@ -95,7 +95,7 @@ def _reported(result: FitOutcome, run: RunContext) -> FitReport:
         folder = out / "reports" / f"{result.model.name}-v{result.model.version}"
         timelines = {k: fit_timeline(log) for k, log in enumerate(result.logs[:MAX_LOGS])}
         interactive = make_interactive(timelines, folder, run.tables_out or out)
-        page, drawings = render(result, interactive)
+        page, drawings = render(result, interactive, made(run.command))
         stored = plan(result.model, out)
         plain = as_json(result, stored, folder / PAGE)
         write_folder(folder, page, drawings, plain, "fit.json", lambda: save(result.model, out), interactive.files())

@@ -12,6 +12,7 @@ from ferryid.ingest import open_log
 from ferryid.ingest.clocks import repair_all
 from ferryid.ingest.log import Reader, Topic
 from ferryid.report.timeline import Strip, Timeline, Trace
+from ferryid.signals.parquet import unit_of
 from ferryid.signals.recording import log_name, make_recording, record
 from ferryid.signals.stream import Stream
 from ferryid.types import Floats, RunContext
@@ -55,6 +56,13 @@ class HeldSignal:
     rate_hz: float
     least: float
     greatest: float
+
+    @property
+    def unit(self) -> str:
+        """Unit of the values as they are shown: degrees for angles."""
+        if _is(self.column, _DEGREES):
+            return "deg/s" if self.column == "r" else "deg"
+        return unit_of(self.column)
 
     @property
     def remark(self) -> str:

@@ -24,9 +24,14 @@ MAX_LOGS = 6
 """Logs whose forces are drawn; the page stays below ten megabytes and readable."""
 
 
-def render(result: FitOutcome, interactive: Interactive = STATIC) -> tuple[str, dict[str, str]]:
-    """Return the report of a fit as HTML with the drawings inside, and the drawings (SVG) by name."""
-    context = _context(result, interactive)
+def render(
+    result: FitOutcome, interactive: Interactive = STATIC, origin: Mapping[str, str] | None = None
+) -> tuple[str, dict[str, str]]:
+    """Return the report of a fit as HTML with the drawings inside, and the drawings (SVG) by name.
+
+    `origin` is what `ferryid.report.folder.made` returns.
+    """
+    context = {**_context(result, interactive), "made": origin}
     return template("fit.html").render(context), dict(_drawings(context))
 
 

@@ -128,6 +128,7 @@ def as_json(error: FerryIdError, what: str, held: Sequence[HeldLog], page: Path)
                     {
                         "column": signal.column,
                         "source": signal.source,
+                        "unit": signal.unit,
                         "rows": signal.rows,
                         "rate_hz": signal.rate_hz if isfinite(signal.rate_hz) else None,
                         "least": signal.least if isfinite(signal.least) else None,
@@ -174,6 +175,7 @@ def _render(
                 {
                     "cells": [
                         signal.source,
+                        signal.unit,
                         signal.rows,
                         _number(signal.rate_hz),
                         _number(signal.least),

@@ -16,6 +16,7 @@ from ferryid.identify.sweeps import (
     structures_json,
     sweep_structures,
 )
+from ferryid.report.folder import made
 from ferryid.report.html import template
 from ferryid.report.outcome import Report
 from ferryid.report.structures_figures import forest
@@ -42,12 +43,12 @@ def structures_and_report(
         raise FerryIdError("--windows: bases are compared at one window. Fix: give --window")
     found = sweep_structures(logs, profile, settings, run, folds=folds)
     run.progress("writing the report")
-    page, drawings = render(found)
+    page, drawings = render(found, run.command)
     text = render_structures(found)
     return leave(run, "basis", found.logs, page, drawings, lambda report: structures_json(found, report), text)
 
 
-def render(found: StructureSweep) -> tuple[str, dict[str, str]]:
+def render(found: StructureSweep, command: Sequence[str] = ()) -> tuple[str, dict[str, str]]:
     """Return the page of compared structures as HTML with the drawings inside, and the drawings (SVG) by name."""
     drawings = {f"basis-{key}": forest(one) for key, one in found.by.items()}
     sections = [
@@ -64,6 +65,7 @@ def render(found: StructureSweep) -> tuple[str, dict[str, str]]:
     ]
     plain = structures_json(found)
     page = template("structures.html").render(
+        made=made(command),
         vessel=found.vessel,
         headline=supported_structure(found.by["blocks"]),
         notes=found.notes,

@@ -7,7 +7,7 @@ from typing import Any
 
 from ferryid.identify import FOLDS, FitSettings
 from ferryid.identify.sweeps import BY, Sweep, sweep_json, sweep_settings
-from ferryid.report.folder import PAGE, write_folder
+from ferryid.report.folder import PAGE, made, write_folder
 from ferryid.report.html import template
 from ferryid.report.outcome import Report
 from ferryid.report.sweep_figures import curves, heat_map
@@ -30,7 +30,7 @@ def sweep_and_report(
     """Sweep settings over logs and write the page; arguments and errors are those of `sweep_settings`."""
     found = sweep_settings(what, logs, profile, settings, run, windows_s=windows_s, folds=folds, archive=archive)
     run.progress("writing the report")
-    page, drawings = render(found)
+    page, drawings = render(found, run.command)
     return leave(run, what, found.logs, page, drawings, lambda report: sweep_json(found, report), render_sweep(found))
 
 
@@ -53,7 +53,7 @@ def leave(
     return Report(plain, f"{text}\nreport  {report}", report)
 
 
-def render(found: Sweep) -> tuple[str, dict[str, str]]:
+def render(found: Sweep, command: Sequence[str] = ()) -> tuple[str, dict[str, str]]:
     """Return the page of a sweep as HTML with the drawings inside, and the drawings (SVG) by name."""
     drawings, sections = {}, []
     for key, choice in found.by.items():
@@ -71,6 +71,7 @@ def render(found: Sweep) -> tuple[str, dict[str, str]]:
         )
     page = template("sweep.html").render(
         what="windows and components" if found.what == "both" else f"{found.what.rstrip('s')}s",
+        made=made(command),
         vessel=found.vessel,
         headline=headline(found),
         notes=found.notes,

@@ -27,8 +27,9 @@ def refusing(error: Exception) -> object:
 
 
 def shown(error: Exception, out: Path, vessel: str = "milliampere") -> str:
+    words = ("ferryid", "fit", "my log.mcap")
     with pytest.raises(type(error)) as caught:
-        shown_where_refused(refusing(error), "fitted", [LOG], load_profile(vessel), RunContext(out))
+        shown_where_refused(refusing(error), "fitted", [LOG], load_profile(vessel), RunContext(out), words)
     return str(caught.value)
 
 
@@ -42,6 +43,7 @@ def test_the_page_has_reason_remedy_signals_and_what_is_missing(tmp_path: Path) 
     places = [
         page.index(part)
         for part in (
+            "ferryid fit &#39;my log.mcap&#39;</span>",
             "<strong>short: &lt;b&gt;the log&lt;/b&gt; is odd, found 1.</strong>",
             "What helps: record it again.",
             *(['data-timeline="1"'] if available() else []),
@@ -49,7 +51,8 @@ def test_the_page_has_reason_remedy_signals_and_what_is_missing(tmp_path: Path) 
             "What is missing",
             "stern_port.speed",
             "What was found",
-            "/navigation/odometry: pose.pose.position.x",
+            '/navigation/odometry: pose.pose.position.x</td><td class="text">m</td>',
+            '<td class="text">deg/s</td>',
         )
     ]
     assert places == sorted(places)
@@ -57,7 +60,8 @@ def test_the_page_has_reason_remedy_signals_and_what_is_missing(tmp_path: Path) 
 
 def test_the_signals_are_those_of_the_log(tmp_path: Path) -> None:
     held = held_log(LOG, load_profile("revolt"), RunContext(tmp_path))
-    assert {"x", "y", "psi", "u", "v", "r"} <= {one.column for one in held.signals}
+    units = {one.column: one.unit for one in held.signals}
+    assert {"x": "m", "psi": "deg", "u": "m/s", "r": "deg/s", "X_d": "N"}.items() <= units.items()
     assert held.needed >= {"stern_port.speed", "bow.angle"}
     assert held.timeline is not None
     assert held.timeline.t[-1] == pytest.approx(90.0, abs=1.0)
