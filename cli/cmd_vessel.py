@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ferryid import interrupts
 from ferryid.cli.completion import vessel_names
 from ferryid.cli.options import From, Json, To, ranges
 from ferryid.cli.output import emit, progress, tell
@@ -71,9 +72,16 @@ def new(
 
 
 def _asked(question: Question) -> str:
-    """Ask a person, until the answer is one; nothing leaves it open."""
+    """Ask a person, until the answer is one; nothing, or the end of the input, leaves it open."""
     while True:
-        answer = str(typer.prompt(f"{question.text}, empty to leave open", default="", show_default=False, err=True))
+        try:
+            answer = str(
+                typer.prompt(f"{question.text}, empty to leave open", default="", show_default=False, err=True)
+            )
+        except typer.Abort:
+            if interrupts.received():
+                raise
+            return ""
         if question.accepts(answer):
             return answer
         tell(f"{answer!r} is no answer here")

@@ -19,6 +19,8 @@ UNKNOWN_ORDER = "whether it is an order or was measured: an order has .command b
 """Doubt of a signal whose name does not state it."""
 _LAGS_S = (0.0, 0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0)
 """Delays at which a motion is compared with an actuator [s]."""
+_AT_ONCE_S = (0.0, 0.2, 0.5)
+"""Delays at which an acceleration is compared with an actuator [s]."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,8 @@ def drafted_actuators(fields: Sequence[ActuatorField], samples: Samples, motion:
     for name, roles in chosen.items():
         signals = []
         for (role, order), field in roles.items():
-            signal = _signal(name, kinds[name], role, order, field, samples)
+            measured = field.order is None and (role, True) in roles
+            signal = _signal(name, kinds[name], role, order, field, samples, measured=measured)
             if role == "angle":
                 signal = _signed(signal, turning)
             elif role == "rudder":
@@ -80,7 +83,10 @@ def _kind(name: str, roles: _Roles) -> str:
     return "force" if kinds == {"force"} else "propeller"
 
 
-def _signal(name: str, kind: str, role: str, order: bool, field: ActuatorField, samples: Samples) -> MappedSignal:
+def _signal(
+    name: str, kind: str, role: str, order: bool, field: ActuatorField, samples: Samples, *, measured: bool = False
+) -> MappedSignal:
+    """Return the signal of a field; `measured` where its name does not state it, but another field is the order."""
     quantity = {"duty": "speed", "force": "force" if kind == "force" else "thrust"}.get(role, role)
     values = samples.raw(field.stream, field.path)
     values = values[np.isfinite(values)]
@@ -88,10 +94,10 @@ def _signal(name: str, kind: str, role: str, order: bool, field: ActuatorField, 
     is_output = re.fullmatch(r"output[0-9]+", name) is not None
     low = float(np.quantile(values, 0.01)) if values.size else 0.0
     unit, why, doubt = _unit(role, field, largest, low)
-    evidence = (
-        *([f"{'an order' if order else 'feedback'}, by its name"] if field.order is not None else []),
-        f"{unit}: {why}",
-    )
+    shown = "an order, by its name" if order else "feedback, by its name" if field.order is False else ""
+    if measured:
+        shown = "feedback, as another field of the actuator is the order"
+    evidence = (*filter(None, [shown]), f"{unit}: {why}")
     return MappedSignal(
         f"{name}.{quantity}{'.command' if order else ''}",
         field.topic,
@@ -104,7 +110,7 @@ def _signal(name: str, kind: str, role: str, order: bool, field: ActuatorField, 
                 None,
                 [
                     doubt,
-                    "" if field.order is not None else UNKNOWN_ORDER,
+                    "" if field.order is not None or measured else UNKNOWN_ORDER,
                     "what this output of the autopilot drives: a thruster, a rudder or a gear" if is_output else "",
                 ],
             )
@@ -178,6 +184,38 @@ def _response(cause: Floats, effect: Floats, step_s: float) -> float:
     return best
 
 
+def _turns(cause: Floats, rate: Floats, step_s: float) -> float:
+    """Return the correlation of yaw acceleration with what causes it, less what the yaw rate explains of both.
+
+    A controller that ends a turn pushes against the yaw rate, so that their correlation alone shows the controller, not the
+    vessel; the acceleration shows the push, and at once.
+    """
+    best = 0.0
+    for lag_s in _AT_ONCE_S:
+        rows = round(lag_s / step_s)
+        if rows >= cause.size:
+            break
+        early, damping = cause[: cause.size - rows], rate[rows:]
+        late = np.asarray(np.gradient(rate, step_s))[rows:]
+        known = np.isfinite(early + late + damping)
+        if np.count_nonzero(known) < DRAFT.fewest_rows or np.ptp(early[known]) == 0.0:
+            continue
+        explained = np.column_stack([np.ones(np.count_nonzero(known)), damping[known]])
+        a, b = (one - explained @ np.linalg.lstsq(explained, one, rcond=None)[0] for one in (early[known], late[known]))
+        size = float(np.sqrt((a @ a) * (b @ b)))
+        value = float(a @ b) / size if size > 0.0 else 0.0
+        best = value if abs(value) > abs(best) else best
+    return best
+
+
+def _turning(cause: Floats, rate: Floats, step_s: float) -> tuple[float, str]:
+    """Return how a cause turns the vessel, and by what that is shown: the acceleration, or else the rate that follows."""
+    seen = _turns(cause, rate, step_s)
+    if abs(seen) >= DRAFT.acts:
+        return seen, "yaw acceleration"
+    return _response(cause, rate, step_s), "yaw rate"
+
+
 def _step(samples: Samples) -> float:
     return float(samples.grid_s[1] - samples.grid_s[0])
 
@@ -185,7 +223,7 @@ def _step(samples: Samples) -> float:
 def _rudder_sign(field: ActuatorField, samples: Samples, motion: Motion) -> _Sign:
     """Return the sign of a rudder angle: the positive one turns a vessel that goes ahead to starboard."""
     ahead = np.where(motion.u > 0.0, 1.0, np.nan)
-    seen = _response(_on_grid(field, samples), motion.r * ahead, _step(samples))
+    seen, by = _turning(_on_grid(field, samples), motion.r * ahead, _step(samples))
     if abs(seen) < DRAFT.acts:
         return (
             1.0,
@@ -193,7 +231,7 @@ def _rudder_sign(field: ActuatorField, samples: Samples, motion: Motion) -> _Sig
             f"the yaw rate does not show its sign (correlation {seen:.2f}): positive to starboard is assumed",
         )
     side = "starboard" if seen > 0.0 else "port"
-    return (1.0 if seen > 0.0 else -1.0), f"positive turns to {side} (correlation with the yaw rate {seen:.2f})", ""
+    return (1.0 if seen > 0.0 else -1.0), f"positive turns to {side} (correlation with the {by} {seen:.2f})", ""
 
 
 def _azimuth_sign(chosen: dict[str, _Roles], kinds: dict[str, str], samples: Samples, motion: Motion) -> _Sign:
@@ -209,7 +247,7 @@ def _azimuth_sign(chosen: dict[str, _Roles], kinds: dict[str, str], samples: Sam
         push = np.ones(side.shape) if speed is None else _on_grid(speed, samples)
         side = side + push * np.abs(push) * np.sin(_on_grid(angle, samples) * turn)
     if len(names) == 1:
-        seen = -_response(side, motion.r, _step(samples))
+        seen = -_turning(side, motion.r, _step(samples))[0]
         what, where = "turns to port when it pushes to starboard at the stern", " (if it is at the bow, sign = -1)"
     else:
         seen, what, where = _response(side, motion.v, _step(samples)), "moves to starboard when they push there", ""
@@ -240,13 +278,20 @@ def _pair_doubt(name: str, chosen: dict[str, _Roles], samples: Samples, motion: 
             sides["starboard"] = field
     if len(sides) < 2 or not set(name.split("_")) & {"left", "right", "port", "starboard"}:
         return 1.0, "", ""
-    seen = _response(_on_grid(sides["port"], samples) - _on_grid(sides["starboard"], samples), motion.r, _step(samples))
+    more = _on_grid(sides["port"], samples) - _on_grid(sides["starboard"], samples)
+    # Without the fallback on the yaw rate: nothing else than a doubt hangs on it.
+    seen = _turns(more, motion.r, _step(samples))
     if seen > DRAFT.acts:
-        return 1.0, f"more to port than to starboard turns to starboard (correlation {seen:.2f})", ""
+        return (
+            1.0,
+            f"more to port than to starboard turns to starboard (correlation with the yaw acceleration {seen:.2f})",
+            "",
+        )
     if seen < -DRAFT.acts:
         return (
             1.0,
             "",
-            f"more to port turns to port (correlation {seen:.2f}): the two are exchanged, or the heading mirrored",
+            f"more to port turns to port (correlation with the yaw acceleration {seen:.2f}): the two are exchanged, or the "
+            "heading mirrored",
         )
     return 1.0, "", ""

@@ -41,7 +41,8 @@ class Draft:
     unused
         Topics of which nothing is mapped.
     unused_fields
-        Of topics of which something is mapped: the further columns of a table, and fields that look like an actuator's.
+        Of topics of which something is mapped: the further columns of a log that is one table, and fields that look like an
+        actuator's.
     """
 
     log: str
@@ -144,7 +145,7 @@ def _left_over(
     of_actuators: set[tuple[str, str]],
     like: Profile | None,
 ) -> tuple[tuple[str, str], ...]:
-    """Return topic and field of what is not mapped, though its topic is: a table's columns, and fields of actuators."""
+    """Return topic and field of what is not mapped, though its topic is: columns of a single table, fields of actuators."""
     taken = {(one.topic, path) for one in mapped for path in (*one.fields, *(name for name, _ in one.where))}
     table = None if like is None else like.table
     times = set() if table is None else {table.time, *table.stamp}
@@ -154,7 +155,7 @@ def _left_over(
         (topic.name, path)
         for topic in topics
         for path in topic.fields
-        if (topic.name, path) not in taken and (topic.encoding == "table" or (topic.name, path) in of_actuators)
+        if (topic.name, path) not in taken and (topic.name == "table" or (topic.name, path) in of_actuators)
     )
 
 

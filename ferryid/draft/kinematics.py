@@ -71,7 +71,7 @@ def navigation_signals(groups: Sequence[FieldGroup], samples: Samples) -> tuple[
     found = []
     if pose.position is not None:
         found.append(_position(pose, chosen, named))
-    found.append(_heading(pose, chosen, slope, named))
+    found.append(_heading(chosen, slope, named, groups, samples))
     if velocity is not None:
         found.append(_velocity(velocity, chosen, _others(groups, chosen, samples)))
         if chosen.frame in _BODY:
@@ -307,14 +307,40 @@ def _mirror(pose: _Pose, named: str) -> tuple[str, ...]:
     )
 
 
-def _heading(pose: _Pose, chosen: _Agreement, slope: Floats, named: str) -> MappedSignal:
+def _heading(
+    chosen: _Agreement, slope: Floats, named: str, groups: Sequence[FieldGroup], samples: Samples
+) -> MappedSignal:
+    pose = chosen.pose
     known = slope[np.isfinite(slope)]
     turned = float(np.degrees(np.quantile(np.abs(known), 0.99))) if known.size else 0.0
-    evidence = [f"the vessel moves along it (mean cosine {_along(pose):.2f}), turning at up to {turned:.1f} deg/s"]
+    seen, along = _hull_velocity(chosen, groups, samples), _along(pose)
+    doubts = list(_mirror(pose, named))
+    evidence = f"it turns at up to {turned:.1f} deg/s"
+    if seen is not None:
+        share, label = seen
+        evidence = f"turned by it, the slope of the position explains {100 * share:.0f} % of {label}; {evidence}"
+    elif along >= DRAFT.agrees:
+        evidence = f"the vessel moves along it (mean cosine {along:.2f}); {evidence}"
+    else:
+        doubts.append(
+            f"the motion does not show its zero and sign (mean cosine of course and heading {along:.2f}): it has to rise in a "
+            "turn to starboard, and be 0 with the bow north"
+        )
     return MappedSignal(
-        "heading", pose.heading.topic, pose.heading.fields, pose.heading_unit, pose.heading_frame, 1.0, tuple(evidence),
-        _mirror(pose, named),
+        "heading", pose.heading.topic, pose.heading.fields, pose.heading_unit, pose.heading_frame, 1.0, (evidence,),
+        tuple(doubts),
     )  # fmt: skip
+
+
+def _hull_velocity(chosen: _Agreement, groups: Sequence[FieldGroup], samples: Samples) -> tuple[float, str] | None:
+    """Return which share of a velocity along the hull position and heading explain, and its name; None where none agrees."""
+    if chosen.pose.position is None:
+        return None
+    if chosen.frame in _BODY and chosen.velocity is not None:
+        return chosen.share, chosen.velocity.label
+    others = [one for one in groups if one.kind == "velocity" and one != chosen.velocity]
+    share, label = max(((_along_hull(chosen.pose, one, samples), one.label) for one in others), default=(0.0, ""))
+    return (share, label) if share >= DRAFT.agrees else None
 
 
 def _others(groups: Sequence[FieldGroup], chosen: _Agreement, samples: Samples) -> tuple[str, ...]:

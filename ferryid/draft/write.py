@@ -16,6 +16,8 @@ from ferryid.draft.mapped import MappedSignal
 from ferryid.vessel.profile import Actuator
 from ferryid.vessel.signal_map import stream_name
 
+USUAL_THRUST = 0.08
+"""Bollard pull of a propeller [N] over square of the speed [rpm] and D⁴: a thrust coefficient of 0.3 in water."""
 MARK = "# FILL IN:"
 """How a line begins that a person has to complete."""
 
@@ -32,6 +34,11 @@ _RUDDER = (
     ),
 )
 """What a propeller with a rudder needs: key, question, hint, and the comment beside it."""
+_AREAS = (
+    ("frontal_m2", "Area above water seen from ahead [m²]", "2.0"),
+    ("lateral_m2", "Area above water seen from the side [m²]", "5.0"),
+)
+"""What a wind acts on: key, question and hint."""
 _ANY_SIGN = ("x_m", "y_m")
 """Ends of keys whose answer may be negative or zero."""
 
@@ -146,6 +153,7 @@ def questions(draft: Draft) -> list[Question]:
             Question("length_m", "Length of the hull [m]", "5.0"),
             Question("beam_m", "Beam [m]", "2.0"),
             Question("mass_kg", "Mass with crew and load, as on the trial [kg]", "1500.0"),
+            *(Question(f"wind.{key}", text, hint) for key, text, hint in _AREAS),
         ]
     known = set() if draft.like is None else {one.name for one in draft.like.actuators}
     for one in draft.actuators:
@@ -247,7 +255,25 @@ def _hull(answers: Answers) -> list[str]:
         _entry(answers, "mass_kg", "mass_kg", "1500.0", "with crew and load, as on the trial"),
         f"{turning}    # radius of gyration: a quarter of the length, usual for boats; not measured",
         "",
+        *_wind_load(answers, length),
+        "",
     ]
+
+
+def _wind_load(answers: Answers, length: str | None) -> list[str]:
+    """Return the areas that a wind acts on; marked as a whole where they are not known, as a profile can do without."""
+    areas = [_number(answers, f"wind.{key}") for key, _, _ in _AREAS]
+    usual = ("CD_t = 0.9", "CD_l_AF = 0.55", "delta = 0.6")
+    note = "# of a speed boat in Blendermann's table (Fossen 2021, Table 10.1); not measured"
+    if length is None or None in areas:
+        lines = ["[wind]    # or remove these lines: then no wind is tested, nor estimated beside the hull"]
+        lines += [f"{key} = {hint}    # {text[0].lower()}{text[1:]}" for key, text, hint in _AREAS]
+        return [
+            f"{MARK} {line}"
+            for line in (*lines, f"length_m = {length or '5.0'}", *usual[:-1], f"{usual[-1]}    {note}")
+        ]
+    lines = ["[wind]", *(f"{key} = {area}" for (key, _, _), area in zip(_AREAS, areas, strict=True))]
+    return [*lines, f"length_m = {length}", *usual[:-1], f"{usual[-1]}    {note}"]
 
 
 def _actuator(one: DraftedActuator, answers: Answers) -> list[str]:
@@ -269,7 +295,7 @@ def _actuator(one: DraftedActuator, answers: Answers) -> list[str]:
             f"ahead = {float(thrust) / float(full) ** 2:.4g}    # {thrust} N at {full} rpm; astern the same, if not given"
         )
     else:
-        lines.append(f"{MARK} ahead = 5e-4    # thrust [N] over the square of the speed [rpm]")
+        lines.append(_usual_thrust(_number(answers, f"{one.name}.diameter_m")))
     if one.kind == "propeller_rudder":
         lines += ["", "[actuator.rudder]"]
         lines += [
@@ -277,6 +303,15 @@ def _actuator(one: DraftedActuator, answers: Answers) -> list[str]:
             for key, _, hint, what in _RUDDER[1:]
         ]
     return [*lines, ""]
+
+
+def _usual_thrust(diameter: str | None) -> str:
+    """Return the line of a thrust that is not known, with the one that is usual for the propeller's diameter."""
+    what = (
+        f"thrust [N] over the square of the speed [rpm]; without a bollard pull about {USUAL_THRUST} D⁴, diameter D [m]"
+    )
+    value = 5e-4 if diameter is None else USUAL_THRUST * float(diameter) ** 4
+    return f"{MARK} ahead = {value:.3g}    # {what}"
 
 
 def _like_sections(draft: Draft, text: str) -> list[str]:

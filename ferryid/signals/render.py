@@ -27,7 +27,7 @@ def render_inspect(result: Mapping[str, Any], width: int = 100) -> str:
         blocks.append(_vessel(result["vessel"], width))
     else:
         blocks.append(_fields(result["topics"], width))
-        blocks.append(_matches(result["bundled"], width))
+        blocks.append(_matches(result["bundled"], str(result["path"]), width))
     shown = {word for block in blocks for line in block.splitlines() for word in line.split()}
     legend = "; ".join(f"{word}: {meaning}" for word, meaning in _LEGEND.items() if word in shown)
     blocks.append(textwrap.fill(legend, width))
@@ -140,7 +140,7 @@ def _fields(topics: Sequence[Mapping[str, Any]], width: int) -> str:
     return "\n".join(lines)
 
 
-def _matches(matches: Sequence[Mapping[str, Any]], width: int) -> str:
+def _matches(matches: Sequence[Mapping[str, Any]], path: str, width: int) -> str:
     usable = [match for match in matches if match["usable"]]
     lines = ["Bundled vessel profiles"]
     lines += [f"  {one['name']}: fits, {one['found']} of {counted(one['signals'], 'signal')} found" for one in usable]
@@ -158,7 +158,7 @@ def _matches(matches: Sequence[Mapping[str, Any]], width: int) -> str:
             if best and best["found"]
             else ""
         )
-        what = f"none fits{near}: describe the vessel and its signals in a profile, and pass it with --vessel"
+        what = f"none fits{near}: draft one with ferryid vessel new {one_line(path)}, or write one and pass it with --vessel"
         lines += _wrapped(what, width)
     return "\n".join(lines)
 

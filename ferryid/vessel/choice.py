@@ -210,8 +210,8 @@ def _none_fits(log: str, matches: Sequence[Match]) -> str:
     others = f"{counted(rest, 'other')} {'have' if rest > 1 else 'has'} fewer" if near else "none has a signal of it"
     listed = f"nearest are {told}; {others}" if near and rest else told or others
     return (
-        f"{log}: no vessel profile fits this log, {listed}. Fix: give --vessel a profile (TOML), or put one beside the log as "
-        "vessel.toml; ferryid vessel show NAME --toml prints one to start from"
+        f"{log}: no vessel profile fits this log, {listed}. Fix: draft one with ferryid vessel new {log}, which writes "
+        "vessel.toml beside the log, or give --vessel a profile (TOML)"
     )
 
 

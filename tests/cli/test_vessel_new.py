@@ -61,7 +61,7 @@ def test_a_draft_to_standard_output_is_toml_alone(ferryid, log: Path) -> None:
 
 
 def test_a_person_is_asked_until_the_answer_is_one(ferryid, log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    answers = "five\n5\n2.8\n1670\n1.8\n0\n1000\n400\n-1.8\n0\n1000\n400\n"
+    answers = "five\n5\n2.8\n1670\n3\n8\n1.8\n0\n1000\n400\n-1.8\n0\n1000\n400\n"
     monkeypatch.setattr(sys, "stdin", _Terminal(answers))
     monkeypatch.setattr(type(sys.stderr), "isatty", lambda self: True, raising=False)
     run = ferryid("vessel", "new", log)
@@ -71,6 +71,16 @@ def test_a_person_is_asked_until_the_answer_is_one(ferryid, log: Path, monkeypat
     assert "FILL IN:" not in text.partition("[hull]")[2]
     assert "position_m = [-1.8, 0]" in text
     assert ferryid("vessel", "check", log.parent / "vessel.toml").code == 0
+
+
+def test_the_end_of_the_answers_leaves_the_rest_open(ferryid, log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stdin", _Terminal("5\n2.8\n"))
+    monkeypatch.setattr(type(sys.stderr), "isatty", lambda self: True, raising=False)
+    run = ferryid("vessel", "new", log)
+    assert run.code == 0, run.err
+    text = (log.parent / "vessel.toml").read_text(encoding="utf-8")
+    assert "beam_m = 2.8" in text
+    assert "# FILL IN: mass_kg" in text
 
 
 @pytest.mark.parametrize(

@@ -23,6 +23,7 @@ NO_DECISION = {
         signals.sampling GRAVITY
         signals.time_ranges _DAY_S
         signals.kalman WINDOW_PER_TIME
+        draft.write USUAL_THRUST
         effects.payload WATER WATERPLANE
         diagnose.data.course NORMAL
         identify.adaptive.averaging NORMAL_95
@@ -78,7 +79,7 @@ NO_DECISION = {
     """,
     "rates, windows and orders of processing: how finely signals and forces are seen": """
         draft.samples GRID_HZ SMOOTHED_S _SMOOTHED_PERIODS
-        draft.actuators _LAGS_S
+        draft.actuators _AT_ONCE_S _LAGS_S
         signals.align RATE_LIMIT_HZ
         signals.kalman _LONGEST_S
         signals.smooth _POLYNOMIAL

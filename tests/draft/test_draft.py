@@ -11,6 +11,7 @@ import pytest
 
 from ferryid import api
 from ferryid.draft import Answers, Draft, Question, draft_profile, draft_text, questions
+from ferryid.draft.actuators import UNKNOWN_ORDER
 from ferryid.draft.mapped import MappedSignal
 from ferryid.draft.write import as_text
 from ferryid.errors import FerryIdError
@@ -235,13 +236,15 @@ def test_marked_lines_are_all_that_a_draft_lacks(tmp_path: Path) -> None:
 def test_answers_complete_a_draft(tmp_path: Path) -> None:
     draft = draft_profile(FIXTURES / "short.mcap")
     asked = questions(draft)
-    assert [one.key for one in asked][:5] == ["length_m", "beam_m", "mass_kg", "thruster1.x_m", "thruster1.y_m"]
+    assert [one.key for one in asked][:5] == ["length_m", "beam_m", "mass_kg", "wind.frontal_m2", "wind.lateral_m2"]
     values = {
         one.key: {"length_m": "5", "beam_m": "2.8", "mass_kg": "1670", "thruster2.x_m": "-1.8"}.get(one.key, "1.8")
         for one in asked
     }
     profile = parse_profile(draft_text(draft, Answers("boat", values)), "boat.toml")
     assert profile.hull.mass_kg == 1670.0
+    assert profile.wind is not None
+    assert profile.wind.lateral_m2 == 1.8
     assert profile.actuators[1].position_m == (-1.8, 1.8)
     assert not any(Question("thruster1.full", "", "").accepts(one) for one in ("five", "0", "-3", "inf"))
     assert Question("thruster1.x_m", "", "").accepts("-1.8")
@@ -257,6 +260,60 @@ def test_a_propeller_with_a_rudder_is_asked_for_both(tmp_path: Path) -> None:
     profile = parse_profile(draft_text(draft, Answers("boat", values)), "boat.toml")
     assert (profile.actuators[0].kind, profile.actuators[0].rudder["x_m"]) == ("propeller_rudder", -2.0)
     assert profile.actuators[0].inflow["diameter_m"] == 1.5
+
+
+def test_a_thrust_that_is_not_known_is_hinted_at_by_the_diameter(tmp_path: Path) -> None:
+    draft, _ = drafted(tmp_path, in_ned(sailed()))
+    # K_T 0.3 of a propeller of 84 mm in water of 1000 kg/m³: 0.3 * 1000 * 0.084^4 / 3600 N/rpm².
+    text = draft_text(draft, Answers("boat", {"propeller.diameter_m": "0.084"}))
+    hint = float(re.search(r"# FILL IN: ahead = (\S+)", text)[1])  # type: ignore[index]
+    assert hint == pytest.approx(0.3 * 1000.0 * 0.084**4 / 3600.0, rel=0.05)
+
+
+def test_beside_an_order_the_other_field_of_an_actuator_was_measured(tmp_path: Path) -> None:
+    made = in_ned(sailed())
+    made["rudder_command"] = np.roll(made["rudder"], -3)
+    _, signals = drafted(tmp_path, made)
+    assert UNKNOWN_ORDER not in signals["propeller.rudder"].doubts
+    assert signals["propeller.rudder"].evidence[0] == "feedback, as another field of the actuator is the order"
+
+
+def test_a_controller_that_ends_turns_does_not_exchange_the_sides(tmp_path: Path) -> None:
+    # A boat that swings after gusts, and thrusters that push against its yaw rate after half a second.
+    rng = np.random.default_rng(3)
+    t = np.arange(0.0, 60.0, 0.1)
+    gust, wiggle = (
+        np.convolve(rng.normal(0.0, size, t.size), np.ones(rows) / rows, mode="same")
+        for size, rows in ((3.0, 60), (2.0, 8))
+    )
+    r, psi, left, right = (np.zeros(t.size) for _ in range(4))
+    for k in range(t.size - 1):
+        push = -10.0 * r[max(k - 5, 0)] + wiggle[k]
+        left[k], right[k] = 20.0 + push, 20.0 - push
+        r[k + 1] = r[k] + 0.1 * ((left[k] - right[k]) * 0.05 + gust[k] - 0.5 * r[k])
+        psi[k + 1] = psi[k] + 0.1 * r[k]
+    left[-1], right[-1] = left[-2], right[-2]
+    columns = {"t": t, "N": np.cumsum(np.cos(psi)) * 0.1, "E": np.cumsum(np.sin(psi)) * 0.1, "psi": psi, "r": r,
+               "left_thrust": left, "right_thrust": right}  # fmt: skip
+    _, signals = drafted(tmp_path, columns)
+    force = next(one for name, one in signals.items() if name.startswith("left."))
+    assert any("turns to starboard" in one for one in force.evidence)
+    assert not any("exchanged" in one for one in force.doubts)
+    swapped = {**columns, "left_thrust": right, "right_thrust": left}
+    _, signals = drafted(tmp_path, swapped)
+    force = next(one for name, one in signals.items() if name.startswith("left."))
+    assert any("exchanged" in one for one in force.doubts)
+
+
+def test_a_heading_that_the_motion_does_not_show_is_to_be_checked(tmp_path: Path) -> None:
+    made = sailed()
+    astray = np.cumsum(np.where(np.arange(made["t"].size) % 400 < 200, 0.02, -0.023))
+    columns = {"t": made["t"], "N": made["N"], "E": made["E"], "heading": np.degrees(astray) % 360.0, "rpm": made["n"]}
+    _, signals = drafted(tmp_path, columns)
+    assert "does not show its zero and sign" in signals["heading"].doubts[-1]
+    assert "moves along" not in signals["heading"].evidence[0]
+    _, signals = drafted(tmp_path, {**columns, "heading": np.degrees(made["psi"]) % 360.0})
+    assert "the vessel moves along it" in signals["heading"].evidence[0]
 
 
 def test_columns_that_are_not_mapped_are_listed(tmp_path: Path) -> None:
