@@ -16,6 +16,7 @@ from ferryid.diagnose.inference.campaign import assemble, repeated
 from ferryid.diagnose.inference.stages import AveragedLog, average
 from ferryid.diagnose.judging.campaign_split import Split, find_split
 from ferryid.diagnose.judging.diagnosis import distinct
+from ferryid.diagnose.parallel import over
 from ferryid.effects.wording import listed
 from ferryid.errors import FerryIdError
 from ferryid.models import Model
@@ -68,16 +69,19 @@ def gather(
     FerryIdError
         Where none can be used, and for a path that leads nowhere.
     """
-    found, errors = list[AveragedLog](), dict[str, FerryIdError]()
-    for path in paths:
+
+    def screened(path: str) -> AveragedLog | FerryIdError:
         try:
-            measured = measure_log(path, profile, run, withhold=withhold)
-            found.append(average(screen_sensors(measured, run.progress)))
+            return average(screen_sensors(measure_log(path, profile, run, withhold=withhold), run.progress))
         except FerryIdError as error:
             # A path that leads nowhere is a slip of the pen, no log that cannot be used.
             if not (Path(path).exists() or all(Path(part).exists() for part in path.split("+"))):
                 raise
-            errors[path] = error
+            return error
+
+    made = over(screened, paths)
+    found = [one for one in made if isinstance(one, AveragedLog)]
+    errors = {path: one for path, one in zip(paths, made, strict=True) if isinstance(one, FerryIdError)}
     if not found:
         raise next(iter(errors.values()))
     whose = "references" if references else "campaign"

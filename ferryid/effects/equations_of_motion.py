@@ -45,6 +45,33 @@ def masses(i: int, hull: Floats, load: Floats) -> tuple[float, float, float, flo
 
 
 @borrowing
+def damping(u: float, v: float, r: float, hull: Floats) -> tuple[float, float, float]:
+    """Return the force of all damping: what `products` fills in, times its coefficients."""
+    av, ar = abs(v), abs(r)
+    vv, rv, vr, rr = av * v, ar * v, av * r, ar * r
+    X = hull[5] * u + hull[6] * (abs(u) * u) + hull[7] * (u * u * u)
+    Y = (
+        hull[8] * v
+        + hull[9] * vv
+        + hull[10] * rv
+        + hull[11] * (v * v * v)
+        + hull[12] * r
+        + hull[13] * vr
+        + hull[14] * rr
+    )
+    N = (
+        hull[15] * v
+        + hull[16] * vv
+        + hull[17] * rv
+        + hull[18] * r
+        + hull[19] * vr
+        + hull[20] * rr
+        + hull[21] * (r * r * r)
+    )
+    return X, Y + (hull[22] * (u * v) + hull[23] * (u * r)), N + (hull[24] * (u * v) + hull[25] * (u * r))
+
+
+@borrowing
 def other_forces(
     i: int,
     mass: tuple[float, float, float, float, float],
@@ -54,19 +81,10 @@ def other_forces(
     hull: Floats,
     external: Floats,
     factor: Floats,
-    product: Floats,
 ) -> tuple[float, float, float]:
     """Return the forces on the hull in a row but the actuators': external ones, damping, and the Coriolis forces."""
     m11, m22, m23, m32, _ = mass
-    X, Y, N = 0.0, 0.0, 0.0
-    for k in range(3):
-        X += hull[MASSES + k] * product[k]
-    for k in range(3, 10):
-        Y += hull[MASSES + k] * product[k]
-    for k in range(10, 17):
-        N += hull[MASSES + k] * product[k]
-    Y += hull[22] * product[17] + hull[23] * product[18]
-    N += hull[24] * product[19] + hull[25] * product[20]
+    X, Y, N = damping(u, v, r, hull)
     much = 1.0 if factor.shape[0] == 0 else factor[i]
     c13, c23 = -m22 * v - 0.5 * (m23 + m32) * r, m11 * u
     return (
@@ -101,12 +119,11 @@ def accelerations(
     flow
         Velocity of the water along the vessel's axes, shape (n, 2).
     """
-    out, product = np.empty_like(nu), np.empty(len(DAMPED))
+    out = np.empty_like(nu)
     for i in range(nu.shape[0]):
         u, v, r = relative(i, nu, flow)
-        products(u, v, r, product)
         mass = masses(i, hull, load)
-        X, Y, N = other_forces(i, mass, u, v, r, hull, external, factor, product)
+        X, Y, N = other_forces(i, mass, u, v, r, hull, external, factor)
         for k in range(parts.shape[1]):
             X, Y, N = X + parts[i, k, 0], Y + parts[i, k, 1], N + parts[i, k, 2]
         a, b, c = solved(mass, X, Y, N)
@@ -122,12 +139,11 @@ def required(
     nu_dot: Floats, nu: Floats, hull: Floats, external: Floats, flow: Floats, load: Floats, factor: Floats
 ) -> Floats:
     """Return the force of the actuators that an acceleration over ground needs, shape (n, 3); see `accelerations`."""
-    out, product = np.empty_like(nu), np.empty(len(DAMPED))
+    out = np.empty_like(nu)
     for i in range(nu.shape[0]):
         u, v, r = relative(i, nu, flow)
-        products(u, v, r, product)
         mass = masses(i, hull, load)
-        X, Y, N = other_forces(i, mass, u, v, r, hull, external, factor, product)
+        X, Y, N = other_forces(i, mass, u, v, r, hull, external, factor)
         a, b, c = nu_dot[i, 0], nu_dot[i, 1], nu_dot[i, 2]
         if flow.shape[0] > 0:
             a, b = a - r * flow[i, 1], b + r * flow[i, 0]
@@ -164,7 +180,7 @@ def slopes(
         u, v, r = relative(i, nu, flow)
         products(u, v, r, product)
         mass = masses(i, hull, load)
-        X, Y, N = other_forces(i, mass, u, v, r, hull, external, factor, product)
+        X, Y, N = other_forces(i, mass, u, v, r, hull, external, factor)
         thrust_X, thrust_Y, thrust_N = 0.0, 0.0, 0.0
         for k in range(parts.shape[1]):
             thrust_X, thrust_Y, thrust_N = (
@@ -179,7 +195,7 @@ def slopes(
             if k < MASSES:
                 moved[k] = hull[k] + moves[q]
                 other = masses(i, moved, load)
-                X, Y, N = other_forces(i, other, u, v, r, hull, external, factor, product)
+                X, Y, N = other_forces(i, other, u, v, r, hull, external, factor)
                 there = solved(other, X + thrust_X, Y + thrust_Y, N + thrust_N)
                 moved[k] = hull[k]
                 out[i, 0, q], out[i, 1, q], out[i, 2, q] = there[0] - here[0], there[1] - here[1], there[2] - here[2]
@@ -218,3 +234,15 @@ def to_ground(values: Floats, cosine: Floats, sine: Floats) -> None:
         for q in range(values.shape[2]):
             a, b = values[i, 0, q], values[i, 1, q]
             values[i, 0, q], values[i, 1, q] = c * a - s * b, s * a + c * b
+
+
+@compiled
+def over_ground(rates: Floats, nu: Floats, cosine: Floats, sine: Floats) -> None:
+    """Turn rates of velocities along the vessel's axes, shape (n, 3), into accelerations north and east, in place.
+
+    The axes turn with the vessel: velocities that stay as they are along them, shape (n, 3), accelerate it too.
+    """
+    for i in range(rates.shape[0]):
+        a, b = rates[i, 0] - nu[i, 2] * nu[i, 1], rates[i, 1] + nu[i, 2] * nu[i, 0]
+        c, s = cosine[i], sine[i]
+        rates[i, 0], rates[i, 1] = c * a - s * b, s * a + c * b

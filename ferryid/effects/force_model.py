@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from ferryid.counts import counted
 from ferryid.effects.equations_of_motion import accelerations, from_antenna, required, slopes
+from ferryid.effects.wind_loads import steady_wind_force
 from ferryid.types import Floats, Ints
 from ferryid.vessel.hull import payload_mass
 from ferryid.vessel.profile import Profile
-from ferryid.vessel.wind import relative_wind_force, wind_force
+from ferryid.vessel.wind import wind_force
 
 MASS = ("m11", "m22", "m23", "m32", "m33")
 SURGE = ("X_u", "X_|u|u", "X_uuu")
@@ -37,6 +38,7 @@ UNITS = (
 )
 """Units of `COEFFICIENTS`, radians left out."""
 _NO_FLOW, _NO_LOAD, _NO_FACTOR = np.empty((0, 2)), np.empty((0, 5)), np.empty(0)
+_ONE_WIND = np.ones(1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,12 +107,6 @@ class Measurements:
     def wind_loads(self) -> dict[tuple[float, ...], Floats]:
         """Loads that were worked out already, by what tells them apart; see `ferryid.effects.wind.mean_load`."""
         return {}
-
-    @cached_property
-    def turning(self) -> Floats:
-        """Acceleration of a vessel whose velocities along its own axes stay as they are [m/s²], shape (n, 3)."""
-        u, v, r = self.nu.T
-        return np.column_stack([-r * v, r * u, np.zeros_like(r)])
 
     @cached_property
     def air_load(self) -> Floats:
@@ -289,17 +285,22 @@ def aboard(payload: Floats) -> Floats:
     return payload_mass(payload)[:, [0, 1, 1, 2, 2], [0, 1, 2, 1, 2]]
 
 
-def wind_load(measurements: Measurements, air: Floats) -> Floats:
+def wind_load(measurements: Measurements, air: Floats, weights: Floats = _ONE_WIND) -> Floats:
     """Return the load of a wind that is steady over ground, on a vessel with wind areas [N, N, N·m], shape (n, 3).
 
-    `air` is where it goes to, north and east [m/s], shape (2,).
+    Parameters
+    ----------
+    measurements
+        Of the vessel.
+    air
+        Where it goes to, north and east [m/s], shape (2,); or several winds, shape (w, 2), whose loads are summed.
+    weights
+        Of the load of each, shape (w,).
     """
     areas = measurements.profile.wind
     assert areas is not None
-    cos, sin = measurements.pointing
-    north, east = air.tolist()
-    u_w, v_w = cos * north + sin * east, cos * east - sin * north
-    return relative_wind_force(areas, measurements.nu[:, 0] - u_w, measurements.nu[:, 1] - v_w)
+    winds = np.ascontiguousarray(np.atleast_2d(air), dtype=np.float64)
+    return steady_wind_force(areas, winds, weights, *measurements.pointing, np.ascontiguousarray(measurements.nu))
 
 
 def between(

@@ -27,6 +27,8 @@ SPEEDS_MPS, BEARINGS = (0.0, 1.5, 3.0, 6.0, 12.0), 12
 """Winds among which the likeliest is where a search begins: as a load goes with the square of the speed, and a controller leans
 against it, a wind from the other side may be likelier than none, and than all between."""
 
+MEAN_WEIGHTS = np.array([1.0 / 3.0, *[1.0 / 6.0] * 4])
+"""Of the loads of a wind as it is on average and in the four gusts of `mean_load`."""
 KEPT = 8
 """Loads of winds that are kept beside the measurements."""
 
@@ -95,13 +97,10 @@ def mean_load(measurements: Measurements, air: Floats, gust_std: float) -> Float
 
 
 def _mean_load(measurements: Measurements, air: Floats, gust_std: float) -> Floats:
-    steady = wind_load(measurements, air)
     if gust_std == 0.0:
-        return steady
-    around = np.zeros_like(steady)
-    for one in sqrt(3.0) * gust_std * np.eye(2):
-        around += wind_load(measurements, air + one) + wind_load(measurements, air - one) - 2.0 * steady
-    return steady + around / 6.0
+        return wind_load(measurements, air)
+    away = sqrt(3.0) * gust_std * np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+    return wind_load(measurements, air + away, MEAN_WEIGHTS)
 
 
 def cannot(measurements: Measurements) -> str:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from threading import Barrier
+from typing import Any
 
 import pytest
 
-from ferryid.diagnose import gathering
+from ferryid.diagnose import gathering, parallel
 from ferryid.diagnose.gathering import Gathered, _clocks, gather, part, sort_out, whole, without_logs
 from ferryid.diagnose.inference.stages import AveragedLog
 from ferryid.effects.force_model import COEFFICIENTS
@@ -151,3 +153,17 @@ def test_references_that_are_logs_are_refused(logs: tuple[AveragedLog, ...]) -> 
     assert without_logs(Gathered((again, logs[1])), logs[:1]).logs == logs[1:2]
     with pytest.raises(FerryIdError, match="holds the motion of"):
         without_logs(Gathered((again,)), logs[:1])
+
+
+def test_logs_are_measured_side_by_side_and_stay_in_their_order(
+    days: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    together, measure = Barrier(2, timeout=30.0), gathering.measure_log
+
+    def met(path: str, *rest: Any, **more: Any) -> Any:
+        together.wait()
+        return measure(path, *rest, **more)
+
+    monkeypatch.setattr(parallel, "_cores", lambda: 2)
+    monkeypatch.setattr(gathering, "measure_log", met)
+    assert [one.path for one in gather(days[:2], FERRY, IN_MEMORY).logs] == days[:2]

@@ -14,6 +14,7 @@ between the two where positions are noisy as well, which is why a finding has to
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations
@@ -128,8 +129,8 @@ class _Data:
         return self.derivatives(p, np.column_stack([u, v]) * p[SCALE])
 
 
-# Several checks ask for the kinematics of the same measurements.
-@lru_cache(maxsize=1)
+# Several checks ask for the kinematics of the same measurements; as many logs are examined side by side as there are cores.
+@lru_cache(maxsize=os.cpu_count() or 1)
 def kinematics(measurements: Measurements, forced: tuple[int, ...] = ()) -> Kinematics | None:
     """Compare positions and velocities; None where the measurements have too little of them.
 

@@ -12,10 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from ferryid.types import Floats
+from ferryid.compiled import compiled
+from ferryid.types import Floats, Ints
 
 Runs = Sequence[tuple[int, int]]
 """Unbroken series of rows, as (first, end)."""
@@ -47,21 +49,49 @@ class ColouredNoise:
 
     def white(self, gaps: Floats, runs: Runs) -> Floats:
         """Return whitened gaps, (J, c) or (J, c, q) for q columns at once, in the same shape."""
-        extra = (slice(None),) + (None,) * (gaps.ndim - 2)
-        left = np.array(gaps, dtype=np.float64)
+        flat = np.ascontiguousarray(gaps, dtype=np.float64).reshape(*gaps.shape[:2], -1)
+        ends = np.array(runs, dtype=np.int64).reshape(-1, 2)
+        return _whitened(flat, ends, self.triangle, self.scale, self.unmix).reshape(gaps.shape)
+
+    @cached_property
+    def triangle(self) -> Floats:
+        """The coefficients of all orders as one array, zero beyond each order's, shape (orders, c, orders - 1)."""
         top = len(self.coefficients) - 1
-        for first, end in runs:
-            part = gaps[first:end]
-            for k in range(1, top + 1):
-                # Row k has k rows before it; those behind row `top` are predicted by the highest order.
-                if k < top and k < len(part):
-                    for j in range(k):
-                        left[first + k] -= self.coefficients[k][:, j][extra] * part[k - 1 - j]
-            for j in range(top if len(part) > top else 0):
-                left[first + top : end] -= self.coefficients[top][:, j][extra] * part[top - 1 - j : len(part) - 1 - j]
-            order = np.minimum(np.arange(end - first), top)
-            left[first:end] /= self.scale[order][(..., *extra[1:])]
-        return np.asarray(np.einsum("ij,nj...->ni...", self.unmix, left))
+        every = np.zeros((top + 1, len(self.unmix), top))
+        for k, one in enumerate(self.coefficients):
+            every[k, :, :k] = one
+        return every
+
+
+@compiled
+def _whitened(gaps: Floats, runs: Ints, coefficients: Floats, scale: Floats, unmix: Floats) -> Floats:
+    """Return `ColouredNoise.white` of gaps, shape (J, c, q), of unbroken series from `runs[:, 0]` up to `runs[:, 1]`."""
+    out = np.zeros_like(gaps)
+    c, q = gaps.shape[1], gaps.shape[2]
+    top = coefficients.shape[2]
+    left = np.empty((c, q))
+    for run in range(runs.shape[0]):
+        first = runs[run, 0]
+        for n in range(first, runs[run, 1]):
+            # A row with k rows before it is predicted by order k, or the highest.
+            k = min(n - first, top)
+            for i in range(c):
+                for m in range(q):
+                    left[i, m] = gaps[n, i, m]
+                for j in range(k):
+                    weight = coefficients[k, i, j]
+                    for m in range(q):
+                        left[i, m] -= weight * gaps[n - 1 - j, i, m]
+                size = scale[k, i]
+                for m in range(q):
+                    left[i, m] /= size
+            for i in range(c):
+                for j in range(c):
+                    weight = unmix[i, j]
+                    if weight != 0.0:
+                        for m in range(q):
+                            out[n, i, m] += weight * left[j, m]
+    return out
 
 
 def fit_coloured_noise(gaps: Floats, runs: Runs, order: int = ORDER) -> ColouredNoise:

@@ -49,9 +49,10 @@ def advance(x: Floats, keep: Floats, blocks: Floats, columns: Floats, k: int, st
         i = CHANNEL_STATES * j
         for b in range(s):
             part = columns[k, j, b]
-            for m in range(q):
-                scratch[b, m] = part * x[CHANNEL_STATES * c + b, m]
-                x[i, m] += half * scratch[b, m]
+            # The second state of a disturbance in a narrow band pushes nothing itself.
+            if part != 0.0:
+                for m in range(q):
+                    x[i, m] += half * (part * x[CHANNEL_STATES * c + b, m])
         for m in range(q):
             speed, wrong, rate, push = x[i + 1, m], x[i + 2, m], x[i + 3, m], x[i + 4, m]
             x[i, m] += h * speed + half * push
@@ -60,14 +61,18 @@ def advance(x: Floats, keep: Floats, blocks: Floats, columns: Floats, k: int, st
             x[i + 3, m] = keep[j, 2] * wrong + keep[j, 3] * rate
             x[i + 4, m] = keep[j, 4] * push
         for b in range(s):
-            for m in range(q):
-                x[i + 1, m] += h * scratch[b, m]
+            part = columns[k, j, b]
+            if part != 0.0:
+                for m in range(q):
+                    x[i + 1, m] += h * (part * x[CHANNEL_STATES * c + b, m])
     for i in range(s):
         for m in range(q):
             scratch[i, m] = 0.0
         for b in range(s):
-            for m in range(q):
-                scratch[i, m] += blocks[i, b] * x[CHANNEL_STATES * c + b, m]
+            part = blocks[i, b]
+            if part != 0.0:
+                for m in range(q):
+                    scratch[i, m] += part * x[CHANNEL_STATES * c + b, m]
     for i in range(s):
         for m in range(q):
             x[CHANNEL_STATES * c + i, m] = scratch[i, m]
@@ -123,7 +128,7 @@ def gains(
     known = 0 if integrals == 2 else 1
     keep = kept(noise, h)
     P, Q, turned = np.zeros((S, S)), np.zeros((S, S)), np.empty((S, S))
-    scratch, sight = np.empty((s, S)), np.empty(S)
+    scratch, sights = np.empty((s, S)), np.empty((c, S))
     for j in range(c):
         i = CHANNEL_STATES * j
         vague = (1e3 * scale[j]) ** 2
@@ -144,17 +149,24 @@ def gains(
             Q[CHANNEL_STATES * c + i, CHANNEL_STATES * c + m] = drive[0, i, m]
     K, spread = np.zeros((n, c, S)), np.empty((n, c))
     for k in range(n):
+        # One measurement after the other; what the ones before have told is taken off the rows that the next one looks at.
         for j in range(c):
             at, wrong_ = CHANNEL_STATES * j + known, CHANNEL_STATES * j + 2
             for i in range(S):
-                sight[i] = P[at, i] + P[wrong_, i]
-            variance = sight[at] + sight[wrong_] + noise[j, 0] * noise[j, 0]
+                sights[j, i] = P[at, i] + P[wrong_, i]
+            for before in range(j):
+                gain = K[k, before, at] + K[k, before, wrong_]
+                for i in range(S):
+                    sights[j, i] -= gain * sights[before, i]
+            variance = sights[j, at] + sights[j, wrong_] + noise[j, 0] * noise[j, 0]
             spread[k, j] = np.sqrt(variance)
             for i in range(S):
-                gain = sight[i] / variance
-                K[k, j, i] = gain
+                K[k, j, i] = sights[j, i] / variance
+        for i in range(S):
+            for j in range(c):
+                gain = K[k, j, i]
                 for m in range(S):
-                    P[i, m] -= gain * sight[m]
+                    P[i, m] -= gain * sights[j, m]
         # F P F' by moving the columns, then the rows: P is symmetric.
         advance(P, keep, blocks, columns, k, h, scratch)
         for i in range(S):
@@ -162,10 +174,9 @@ def gains(
                 turned[m, i] = P[i, m]
         advance(turned, keep, blocks, columns, k, h, scratch)
         for i in range(S):
-            P[i, i] = turned[i, i] + Q[i, i]
-            for m in range(i):
-                both = 0.5 * (turned[i, m] + turned[m, i]) + Q[i, m]
-                P[i, m], P[m, i] = both, both
+            for m in range(i + 1):
+                P[i, m] = turned[i, m] + Q[i, m]
+                P[m, i] = P[i, m]
         if s == 0 and k > 0:
             change, largest = 0.0, 0.0
             for j in range(c):

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ferryid.compiled import compiled
 from ferryid.diagnose.inference.thresholds import INFERENCE
-from ferryid.effects.equations_of_motion import to_ground
+from ferryid.effects.equations_of_motion import over_ground, to_ground
 from ferryid.effects.force_model import ForceModel, Measurements, as_measured, hull_changes
 from ferryid.regression import window_weights
 from ferryid.types import Floats, Ints
@@ -70,8 +70,15 @@ class Windows:
         """Return the force model's acceleration less the measured one in every window, shape (J, channels)."""
         rates = as_measured(force_model)
         if self.channels[0]:
-            rates = rates + self.measurements.turning
-        return self.mean(self.along(rates)) - self.measured[:, self.channels]
+            over_ground(rates, self.measurements.nu, *self.measurements.pointing)
+        gaps = self.mean(rates)
+        gaps -= self.measured_channels
+        return gaps
+
+    @cached_property
+    def measured_channels(self) -> Floats:
+        """Measured accelerations of the channels that are used, shape (J, channels)."""
+        return self.measured[:, self.channels]
 
     def along(self, rates: Floats) -> Floats:
         """Return accelerations along the vessel's axes as those along the channels, shape (n, 3) each."""
@@ -190,11 +197,24 @@ def _means(values: Floats, weight: Floats, starts: NDArray[np.int64], step_s: fl
 def weighed(values: Floats, weight: Floats, starts: Ints) -> Floats:
     """Return the sum of m rows times a weight, shape (m,), from every start on: shape (J, c), of values with c columns."""
     out = np.zeros((starts.shape[0], values.shape[1]))
+    first, end = 0, weight.shape[0]
+    while first < end and weight[first] == 0.0:
+        first += 1
+    while end > first and weight[end - 1] == 0.0:
+        end -= 1
+    if values.shape[1] == 3:
+        # Most are of three channels: sums that stay in registers.
+        for j in range(starts.shape[0]):
+            a, b, c = 0.0, 0.0, 0.0
+            for i in range(first, end):
+                part, row = weight[i], starts[j] + i
+                a, b, c = a + part * values[row, 0], b + part * values[row, 1], c + part * values[row, 2]
+            out[j, 0], out[j, 1], out[j, 2] = a, b, c
+        return out
     for j in range(starts.shape[0]):
-        for i in range(weight.shape[0]):
-            if weight[i] != 0.0:
-                for q in range(values.shape[1]):
-                    out[j, q] += weight[i] * values[starts[j] + i, q]
+        for i in range(first, end):
+            for q in range(values.shape[1]):
+                out[j, q] += weight[i] * values[starts[j] + i, q]
     return out
 
 

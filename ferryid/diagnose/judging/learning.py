@@ -9,6 +9,7 @@ from math import isfinite, nan
 import numpy as np
 
 from ferryid.diagnose.judging.thresholds import JUDGING
+from ferryid.diagnose.parallel import over
 from ferryid.errors import FerryIdError
 from ferryid.identify import (
     Acceptance,
@@ -130,8 +131,7 @@ class Learner:
     def _on_top(self, base: Model, diagnosed: Model | None) -> tuple[Model | None, Learned]:
         """Return the model to store: what is examined or diagnosed, with a correction where that is accepted."""
         start = self.start or blank_model(self.profile, base.name)
-        plain = fit_logs(self.paths, self.profile, self.settings, self.run, name=base.name)
-        found = self._remainder(base)
+        plain, found = self._plain_and_remainder(base)
         rows = [one.validation & other.validation for one, other in zip(plain.logs, found.outcome.logs, strict=True)]
         before, known, after, fitted = self._errors([start, base, found.model, plain.model], rows)
         verdict, what = _judged(found.outcome, known, after), "A correction learned on top of the findings"
@@ -158,6 +158,19 @@ class Learner:
                 f"{float(np.mean(over_fit)):.2f} times as large."
             )
         return stored, Learned(verdict.accepted, said, verdict.reasons, by_axis(_over(after, known)), by_axis(over_fit))
+
+    def _plain_and_remainder(self, base: Model) -> tuple[FitOutcome, _Candidate]:
+        """Return the fit alone, and that to what a model leaves, made side by side."""
+        plain, left = list[FitOutcome](), list[_Candidate]()
+
+        def make(alone: bool) -> None:  # noqa: FBT001
+            if alone:
+                plain.append(fit_logs(self.paths, self.profile, self.settings, self.run, name=base.name))
+            else:
+                left.append(self._remainder(base))
+
+        over(make, (True, False))
+        return plain[0], left[0]
 
     def _remainder(self, base: Model) -> _Candidate:
         outcome = fit_remainder(base, self.paths, self.profile, self.settings, self.run)
