@@ -132,17 +132,32 @@ class Campaign:
 
     def values(self, common: Floats, own: Floats) -> tuple[list[Floats], list[Floats]]:
         """Return the parameters of the conditions of a log and of the properties, in their units and within their limits."""
-        h, s, p = len(self.hull.mean), len(self.shared), len(self.lasting)
-        shares, means = common[h : h + s], common[self.means] + own[: len(self.own)]
-        conditions = []
-        for k, condition in enumerate(self.conditions):
-            mine = iter(means[[j for j, (of, _) in enumerate(self.own) if of == k]].tolist())
-            others = iter(shares[[j for j, (of, _) in enumerate(self.shared) if of == k]].tolist())
-            z = [next(mine) if one.name in condition.effect.of_log else next(others) for one in condition.parameters]
-            conditions.append(_in_units(condition.parameters, np.array(z)))
-        cuts = np.cumsum([len(one.parameters) for one in self.properties])[:-1].tolist()
-        lasting = np.split(common[h + s : h + s + p], cuts) if self.properties else []
-        return conditions, [_in_units(one.parameters, z) for one, z in zip(self.properties, lasting, strict=True)]
+        means = common[self.means] + own[: len(self.own)]
+        every = np.concatenate([common[len(self.hull.mean) : self.g - len(self.own)], means])
+        first, limits, cuts = self._layout
+        neutral, size, low, high = limits
+        found = np.split(np.clip(neutral + size * every[first], low, high), cuts)
+        return found[: len(self.conditions)], found[len(self.conditions) : len(self.conditions) + len(self.properties)]
+
+    @cached_property
+    def _layout(self) -> tuple[Ints, Floats, list[int]]:
+        """Where parameters of conditions and properties stand among what is shared, lasting, and a log's own, in this order.
+
+        Beside the places their neutral values, sizes and limits, shape (4, p), and where one condition or property ends.
+        """
+        shared, own = iter(range(len(self.shared))), iter(range(len(self.own)))
+        lasting = iter(range(len(self.shared), len(self.shared) + len(self.lasting)))
+        behind = len(self.shared) + len(self.lasting)
+        places = [
+            behind + next(own) if one.name in condition.effect.of_log else next(shared)
+            for condition in self.conditions
+            for one in condition.parameters
+        ]
+        places += [next(lasting) for _ in self.lasting]
+        every = [*self.conditions, *self.properties]
+        rows = [(one.neutral, one.size, one.low, one.high) for candidate in every for one in candidate.parameters]
+        cuts = np.cumsum([len(one.parameters) for one in every]).tolist()
+        return np.array(places, dtype=np.int64), np.array(rows).reshape(-1, 4).T, cuts
 
     def force_model(self, i: int, common: Floats, own: Floats) -> ForceModel:
         """Return a log's force model at an estimate, without its steady acceleration."""
@@ -207,11 +222,13 @@ def induced(force_model: ForceModel, coefficients: Floats) -> ForceModel:
 
     It is an external force at the measured motion.
     """
-    _, v, r = force_model.measurements.nu.T
     X_vr, X_vv = coefficients
-    still = np.zeros_like(v)
-    force = np.column_stack([(X_vr * r + X_vv * v) * v, still, still])
-    return replace(force_model, external=force_model.external + force)
+    if X_vr == 0.0 and X_vv == 0.0:
+        return force_model
+    _, v, r = force_model.measurements.nu.T
+    external = force_model.external.copy()
+    external[:, 0] += (X_vr * r + X_vv * v) * v
+    return replace(force_model, external=external)
 
 
 def induced_spread(length_m: float, draught_m: float, water_density: float = 1000.0) -> Floats:
@@ -224,8 +241,3 @@ def _moved(vector: Floats, k: int, sign: float = 1.0) -> Floats:
     moved = vector.copy()
     moved[k] += sign * DIFFERENCE_STEP
     return moved
-
-
-def _in_units(parameters: Sequence[Parameter], z: Floats) -> Floats:
-    limits = np.array([(one.neutral, one.size, one.low, one.high) for one in parameters])
-    return np.asarray(np.clip(limits[:, 0] + limits[:, 1] * z, limits[:, 2], limits[:, 3]))

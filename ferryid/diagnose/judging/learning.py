@@ -163,7 +163,7 @@ class Learner:
         """Return the fit alone, and that to what a model leaves, made side by side."""
         plain, left = list[FitOutcome](), list[_Candidate]()
 
-        def make(alone: bool) -> None:  # noqa: FBT001
+        def make(alone: bool) -> None:
             if alone:
                 plain.append(fit_logs(self.paths, self.profile, self.settings, self.run, name=base.name))
             else:
