@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ferryid.counts import counted
-from ferryid.diagnose.checks.screening import screen_sensors
+from ferryid.diagnose.checks.screening import screen_sensors, screen_together
 from ferryid.diagnose.data.measurements import measure_log
 from ferryid.diagnose.data.simulated import simulated
 from ferryid.diagnose.inference.campaign import assemble, repeated
@@ -91,6 +91,14 @@ def gather(
     ]
     kept, why = sort_out(found, whose)
     return Gathered(tuple(kept), (*notes, *why, *_clocks(kept)))
+
+
+def with_common_sensors(logs: Sequence[AveragedLog]) -> tuple[AveragedLog, ...]:
+    """Return the logs of one vessel with what several of them show of its sensors corrected in all of them."""
+    again = {path for path, _ in repeated(logs)}
+    copies = [one.path in again or one.path in {each.path for each in logs[:k]} for k, one in enumerate(logs)]
+    screened = screen_together([one.screened for one in logs], copies)
+    return tuple(log if one is log.screened else average(one) for log, one in zip(logs, screened, strict=True))
 
 
 def sort_out(logs: Sequence[AveragedLog], whose: str) -> tuple[list[AveragedLog], list[str]]:

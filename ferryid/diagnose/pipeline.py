@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path, PurePath
 
-from ferryid.diagnose.gathering import Gathered, Group, gather, part, without_logs
+from ferryid.diagnose.gathering import Gathered, Group, gather, part, with_common_sensors, without_logs
 from ferryid.diagnose.inference.baselines import CampaignBaseline, HullBaseline, SimulationBaseline
 from ferryid.diagnose.inference.campaign import assemble
 from ferryid.diagnose.inference.simulation_baseline import learn_simulation
@@ -132,6 +132,12 @@ def _groups(
         return (Group(gathered.logs, notes=gathered.notes),)
     if references.logs:
         references = without_logs(references, gathered.logs)
+    run.progress("comparing the sensors of the logs")
+    logs = with_common_sensors([*gathered.logs, *references.logs])
+    gathered, references = (
+        replace(one, logs=some)
+        for one, some in ((gathered, logs[: len(gathered.logs)]), (references, logs[len(gathered.logs) :]))
+    )
     run.progress("comparing the hulls of the logs")
     return part(gathered, references, profile, settings.model)
 
@@ -151,7 +157,12 @@ def _diagnosed(
         if settings.withhold and together is not None:
             gains = hidden_gains(together.conditions.tests, together.hull.place, group.logs, settings.model)
         found += [
-            replace(one, latest=k == len(groups) - 1, sources=sources, withheld=with_gains(one.withheld, gains))
+            replace(
+                one,
+                latest=k == len(groups) - 1,
+                sources=sources,
+                withheld=with_gains(one.withheld, gains, told=len(made) == 1),
+            )
             for one in made
         ]
     return tuple(found)

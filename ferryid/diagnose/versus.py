@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ferryid.counts import counted
-from ferryid.diagnose.gathering import gather, whole
+from ferryid.diagnose.gathering import gather, whole, with_common_sensors
 from ferryid.diagnose.inference.campaign import assemble, repeated
 from ferryid.diagnose.inference.group_differences import GROUPS, in_groups
 from ferryid.diagnose.inference.stages import AveragedLog
@@ -97,7 +97,8 @@ def compare_groups(
         found = gather(list(dict.fromkeys(paths)), profile, run, withhold=settings.withhold)
         run.progress(f"comparing the hulls of group {group}")
         found = whole(found, profile, settings.model)
-        averaged += found.logs
+        # What differs between the groups is not to be pooled away.
+        averaged += with_common_sensors(found.logs)
         notes += [f"Group {group}: {one}" for one in found.notes]
         name_of |= {one.path: group for one in found.logs}
     for path, other in repeated(averaged):

@@ -80,8 +80,10 @@ def withheld_summary(diagnoses: Sequence[Diagnosis], effect: str) -> str:
         return ""
     found = [one for one in hidden if one.off is not None]
     told = f"The measured {effect} was withheld from {counted(len(hidden), 'log')}, and it was found in {len(found)}"
+    # One of each group of logs with a hull of its own.
+    gains = dict.fromkeys(one.gain.says(effect) for one in hidden if one.gain is not None)
     if not found:
-        return f"{told}."
+        return " ".join([f"{told}.", *gains])
     angle, strength = np.median([one.off for one in found if one.off is not None], axis=0)
     inside = [one.found[name].low <= one.measured[name] <= one.found[name].high for one in found for name in COMPONENTS]
     parts = [
@@ -92,8 +94,7 @@ def withheld_summary(diagnoses: Sequence[Diagnosis], effect: str) -> str:
     courses = [one.course.correlation for one in found if one.course and isfinite(one.course.correlation)]
     if courses:
         parts.append(f"over time, estimate and measurement correlate by {np.median(courses):.2f} in the median")
-    gains = [one.gain.says(effect) for one in hidden if one.gain is not None]
-    return " ".join([f"{told}: {'; '.join(parts)}.", *gains[:1]])
+    return " ".join([f"{told}: {'; '.join(parts)}.", *gains])
 
 
 def error_sentence(diagnoses: Sequence[Diagnosis]) -> str:

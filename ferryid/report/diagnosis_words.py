@@ -319,18 +319,20 @@ def about_errors(diagnosis: Diagnosis) -> list[str]:
 
 
 def findings_of_all(diagnoses: Sequence[Diagnosis]) -> tuple[Finding, ...]:
-    """Return the findings that every one of several logs has in the same words: what the vessel has, not a log.
+    """Return the findings of the vessel, not of a log: those of its sensors, and what every log has in the same words.
 
     What has a figure of its own stays with its log.
     """
     if len(diagnoses) < 2:
         return ()
     every = [{(one.key, one.says) for one in diagnosis.findings} for diagnosis in diagnoses]
-    return tuple(
-        one
-        for one in diagnoses[0].findings
-        if "before" not in one.evidence and all((one.key, one.says) in shown for shown in every)
-    )
+    found = {
+        (one.key, one.says): one
+        for diagnosis in diagnoses
+        for one in diagnosis.findings
+        if one.vessel or ("before" not in one.evidence and all((one.key, one.says) in shown for shown in every))
+    }
+    return tuple(found.values())
 
 
 def findings_of(diagnosis: Diagnosis, shared: Sequence[Finding] = ()) -> list[Finding]:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ferryid.diagnose.checks.screening import screen_sensors
 from ferryid.diagnose.data.measurements import measure_log, read_measurements, window_lengths
+from ferryid.diagnose.gathering import with_common_sensors
 from ferryid.diagnose.inference.estimation import EstimationProblem, estimation_problem
 from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.diagnose.inference.stages import AveragedLog, average
@@ -43,7 +44,7 @@ def sailed(folder: Path, name: str, scenario: str, seed: int) -> Measurements:
 def averaged(paths: Sequence[str], vessel: Profile, withhold: Sequence[str] = ()) -> list[AveragedLog]:
     """Return logs as the first stages of a diagnosis leave them."""
     measured = [measure_log(path, vessel, IN_MEMORY, withhold=withhold) for path in paths]
-    return [average(screen_sensors(log, no_progress)) for log in measured]
+    return list(with_common_sensors([average(screen_sensors(log, no_progress)) for log in measured]))
 
 
 def trial_on(measurements: Measurements) -> EstimationProblem:

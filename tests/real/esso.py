@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from ferryid.diagnose.checks import examine
 from ferryid.diagnose.data.course import MeasuredCourse
 from ferryid.diagnose.data.measurements import read_measurements, window_lengths
 from ferryid.diagnose.inference.campaign import assemble
 from ferryid.diagnose.inference.campaign_estimation import estimate_campaign
 from ferryid.diagnose.inference.campaign_model import Campaign, Member
 from ferryid.diagnose.inference.estimation import Candidate
+from ferryid.diagnose.inference.stages import AveragedLog
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.campaign_conditions import ConditionTest, JudgedConditions, judge_conditions
 from ferryid.diagnose.judging.campaign_evidence import EXCHANGED, MIRRORED, Gain, held_out_loss, turned
@@ -141,11 +141,13 @@ class Study:
 
 def study(kind: str, *, controlled: bool = True) -> Study:
     """Estimate runs together with the wind withheld and judge their conditions; where `controlled`, the controls' as well."""
-    assembled = assemble(averaged(logs(kind), ESSO, withhold=(WIND,)), ESSO)
+    screened = averaged(logs(kind), ESSO, withhold=(WIND,))
+    assembled = assemble(screened, ESSO)
     assert assembled is not None
     campaign, place = assembled
     kept = sorted(place, key=lambda path: place[path])
-    hidden = [hidden_wind(path, member) for path, member in zip(kept, campaign.members, strict=True)]
+    by_path = {one.path: one for one in screened}
+    hidden = [hidden_wind(by_path[path]) for path in kept]
     usable = [wind[member.windows.measurements.usable] for wind, member in zip(hidden, campaign.members, strict=True)]
     found = judged(campaign, place)
     steady = [np.broadcast_to(rows.mean(axis=0), wind.shape) for wind, rows in zip(hidden, usable, strict=True)]
@@ -227,14 +229,12 @@ def gain_of(campaign: Campaign, winds: list[Floats], factors: Floats, test: Cond
     return Gain.of(held_out_loss(made).gain(test.loss[0]))
 
 
-def hidden_wind(path: str, member: Member) -> Floats:
+def hidden_wind(log: AveragedLog) -> Floats:
     """Return the wind that a run measured, on the rows of its windows' measurements, shape (n, 2)."""
-    measurements, _ = read_measurements(path, ESSO)
-    corrected = windows(
-        replace(examine(replace(measurements, wind=None))[1], wind=measurements.wind), *window_lengths(ESSO)
-    ).measurements
+    wind = read_measurements(log.path, ESSO)[0].wind
+    corrected = windows(replace(log.screened.measurements, wind=wind), *window_lengths(ESSO)).measurements
     assert corrected.wind is not None
-    assert np.allclose(corrected.t, member.windows.measurements.t)
+    assert np.allclose(corrected.t, log.windows.measurements.t)
     return corrected.wind
 
 

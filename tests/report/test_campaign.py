@@ -6,11 +6,14 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from ferryid.diagnose.judging.diagnosis import Diagnosis
+from ferryid.diagnose.judging.diagnosis import Diagnosis, Withheld
+from ferryid.diagnose.judging.hidden_gain import HiddenGain
+from ferryid.diagnose.judging.hidden_signal import with_gains
 from ferryid.report.diagnosis_page import as_text
-from ferryid.report.diagnosis_report import report
+from ferryid.report.diagnosis_report import as_json, report
 from tests.report.test_diagnosis import conforms, diagnosis, gain, wind
 
 SHARED = "thruster1 gives 85 % of the force that its speed promises."
@@ -71,3 +74,25 @@ def test_which_logs_take_part_stands_before_all_logs(tmp_path: Path) -> None:
 
 def test_a_single_log_shares_nothing() -> None:
     assert "In all logs" not in as_text(campaign()[:1])
+
+
+def test_what_the_sensors_of_the_vessel_show_stands_once_beside_a_log_that_differs() -> None:
+    late = replace(gain(), effect="clock_offset", instance=None, says="Velocity lags position by 0.80 s.", vessel=True)
+    own = replace(late, says="Velocity lags position by 0.30 s.", vessel=False)
+    several = [
+        replace(diagnosis("partly_explained", log), findings=(one,))
+        for log, one in (("first", late), ("second", late), ("third", own))
+    ]
+    text = as_text(several)
+    assert text.count(late.says) == 1
+    found = as_json(several)["findings"]
+    assert [(one["says"], one["log"]) for one in found] == [(late.says, None), (own.says, "third")]
+
+
+def test_the_share_of_a_withheld_sensor_stands_once_for_all_logs() -> None:
+    blocks = np.array([10.0, 20.0, 15.0, 30.0, 25.0])
+    share = HiddenGain.of(0.5 * blocks, blocks, 2)
+    wind_N = {"north": 1.0, "east": 0.0}
+    hidden = with_gains((Withheld("wind", {}, wind_N, "The wind was hidden."),), {"wind": share}, told=False)
+    several = [replace(diagnosis("matched", log), withheld=hidden) for log in ("first", "second")]
+    assert " ".join(as_text(several).split()).count(share.says("wind")) == 1

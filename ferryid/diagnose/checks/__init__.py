@@ -8,7 +8,7 @@ delay of them all) leaves no trace in them, and only forces can tell: see `ferry
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from importlib import import_module
@@ -18,6 +18,7 @@ import numpy as np
 
 from ferryid.diagnose.checks.check import Check, SensorFinding
 from ferryid.diagnose.checks.contradiction import opposed
+from ferryid.diagnose.checks.pooling import Examined, find_in_turn, pool_check
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
 from ferryid.errors import FerryIdError
@@ -25,10 +26,21 @@ from ferryid.signals.complementary_filter import MEAN_S, complementary_filter
 from ferryid.signals.mirror import mirrored
 from ferryid.signals.smooth import odd_rows, steady_mean
 
-SPOILS = frozenset({"held_samples", "heading_wrap", "heading_bias", "velocity_scale", "yaw_rate_scale"})
-"""Errors that spoil the velocity in products, which is made of position, heading and velocity; small shifts in time do not."""
+SPOILS = frozenset({"held_samples", "heading_wrap", "clock_offset", "heading_bias", "velocity_scale", "yaw_rate_scale"})
+"""Errors that spoil the velocity in products, which is made of position, heading and velocity.
 
-__all__ = ["Check", "SensorFinding", "checks", "examine", "refilter_velocity", "sensor_errors"]
+Its slow part is that of the positions, so that a late clock is in one part of it and not in the other.
+"""
+
+__all__ = [
+    "Check",
+    "SensorFinding",
+    "checks",
+    "examine",
+    "examine_together",
+    "refilter_velocity",
+    "sensor_errors",
+]
 
 
 @cache
@@ -54,14 +66,8 @@ def examine(measurements: Measurements) -> tuple[tuple[SensorFinding, ...], Meas
             f"Fix: correct the frame of [signals.{wrong}] in the profile {measurements.profile.name}, or of what it is "
             "compared with"
         )
-    findings = []
-    for check in checks():
-        finding = check.find(measurements)
-        if finding is not None:
-            findings.append(finding)
-            measurements = finding.correct(measurements)
-    if SPOILS & {finding.effect for finding in findings}:
-        measurements = refilter_velocity(measurements)
+    findings, corrected = find_in_turn(checks(), measurements)
+    measurements = _refiltered(findings, measurements, corrected)
     if says := opposed(measurements):
         raise FerryIdError(
             f"{measurements.profile.path}: force and motion contradict each other, so no model can be identified from them. "
@@ -69,6 +75,37 @@ def examine(measurements: Measurements) -> tuple[tuple[SensorFinding, ...], Meas
             "clocks of the log"
         )
     return tuple(findings), measurements
+
+
+def examine_together(
+    logs: Sequence[Measurements], alone: Sequence[Sequence[SensorFinding]], copies: Sequence[bool]
+) -> tuple[Examined, ...]:
+    """Return the logs of one vessel with the errors of their sensors, those that several show pooled over all of them.
+
+    Parameters
+    ----------
+    logs
+        As they were measured.
+    alone
+        What `examine` found in each by itself.
+    copies
+        Which of them hold the motion of another, and have no say of their own.
+    """
+    examined = tuple(
+        Examined({each.effect: each for each in found}, one, copy=copy)
+        for one, found, copy in zip(logs, alone, copies, strict=True)
+    )
+    for number, check in enumerate(checks(), 1):
+        pool_check(check, checks()[number:], examined)
+    for one, log in zip(examined, logs, strict=True):
+        one.measurements = _refiltered(one.findings, log, one.measurements)
+    return examined
+
+
+def _refiltered(findings: Sequence[SensorFinding], measured: Measurements, corrected: Measurements) -> Measurements:
+    """Return what was corrected with a velocity in products made of it, where that is spoilt."""
+    spoilt = corrected is not measured and SPOILS & {finding.effect for finding in findings}
+    return refilter_velocity(corrected) if spoilt else corrected
 
 
 def sensor_errors(measurements: Measurements) -> dict[str, Mapping[str, Estimate]]:

@@ -26,6 +26,10 @@ class SensorFinding:
         Returns the measurements without the error.
     evidence
         Columns for the figure that shows it: name to values.
+    probability
+        That it is so.
+    vessel
+        True for what all logs of a campaign show together: see `ferryid.diagnose.checks.pooling`.
     """
 
     effect: str
@@ -33,6 +37,33 @@ class SensorFinding:
     says: str
     correct: Callable[[Measurements], Measurements]
     evidence: Mapping[str, Floats] = field(default_factory=dict)
+    probability: float = 1.0
+    vessel: bool = False
+
+
+@dataclass(frozen=True)
+class Lasting:
+    """What is known of an error that a sensor keeps from log to log, so that logs of a campaign can be pooled.
+
+    Attributes
+    ----------
+    neutral
+        Value of each parameter without the error.
+    size
+        Standard deviation of what a parameter may be, in its unit.
+    least
+        Returns how far a parameter has to be from neutral to be worth a name.
+    says
+        Returns the finding as a sentence, of values by name.
+    corrected
+        Returns measurements without an error of these values.
+    """
+
+    neutral: float
+    size: float
+    least: Callable[[Measurements], float]
+    says: Callable[[Mapping[str, float]], str]
+    corrected: Callable[[Measurements, Mapping[str, float]], Measurements]
 
 
 @dataclass(frozen=True)
@@ -50,6 +81,8 @@ class Check:
     estimate
         Returns the error's parameters however small it is, as `find` would estimate them; empty where the measurements show
         none. None of checks whose errors have no size below what is found.
+    lasting
+        Of errors that a sensor keeps; None of events.
     """
 
     id: str
@@ -57,3 +90,4 @@ class Check:
     find: Callable[[Measurements], SensorFinding | None]
     place: int
     estimate: Callable[[Measurements], Mapping[str, Estimate]] | None = None
+    lasting: Lasting | None = None

@@ -1,17 +1,19 @@
 """Clock offset within the navigation: positions that are later than velocities, or earlier.
 
 Which of the two is right is not for kinematics to say. Measurements are late rather than early, so the later one is moved;
-in a short log neither is, as a guess and an uncertain size would enter all its forces.
+in a short log by itself neither is, as a guess and an uncertain size would enter all its forces. What the logs of a campaign
+show together is corrected in all of them.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from ferryid.diagnose.checks.check import Check, SensorFinding
-from ferryid.diagnose.checks.kinematics import LATE, kinematics
+from ferryid.diagnose.checks.check import Check, Lasting, SensorFinding
+from ferryid.diagnose.checks.kinematics import LATE, SIZE, kinematics
 from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
@@ -25,27 +27,36 @@ def find(measurements: Measurements) -> SensorFinding | None:
     if found is None or not found.found(LATE, CHECKS.least_delay_s):
         return None
     late = found.solution.estimate(LATE, "s")
-    lagging, leading = ("Position", "velocity") if late.value > 0.0 else ("Velocity", "position")
-
-    def correct(measured: Measurements) -> Measurements:
-        when = measured.t + abs(late.value)
-        inside = np.interp(when, measured.t, measured.usable.astype(np.float64), left=0.0, right=0.0) >= 1.0
-        usable = measured.usable & inside
-        if late.value > 0.0:
-            return replace(
-                measured, eta=np.column_stack([_at(when, measured, measured.eta[:, :2]), measured.psi]), usable=usable
-            )
-        moved = (_earlier(when, measured, nu) for nu in (measured.nu_raw, measured.nu))
-        return replace(measured, nu_raw=next(moved), nu=next(moved), usable=usable)
-
-    says = f"{lagging} lags {leading} by {abs(late.value):.2f} s."
+    values = {"seconds": late.value}
+    says = says_of(values)
     return SensorFinding(
         "clock_offset",
         {"seconds": late},
         f"{says} It is not corrected in so short a log." if found.short else says,
-        (lambda measured: measured) if found.short else correct,
+        (lambda measured: measured) if found.short else lambda measured: corrected(measured, values),
         found.evidence(LATE),
     )
+
+
+def says_of(values: Mapping[str, float]) -> str:
+    """Return which of the two lags, as a sentence."""
+    late = values["seconds"]
+    lagging, leading = ("Position", "velocity") if late > 0.0 else ("Velocity", "position")
+    return f"{lagging} lags {leading} by {abs(late):.2f} s."
+
+
+def corrected(measured: Measurements, values: Mapping[str, float]) -> Measurements:
+    """Return measurements whose later clock is moved."""
+    late = values["seconds"]
+    when = measured.t + abs(late)
+    inside = np.interp(when, measured.t, measured.usable.astype(np.float64), left=0.0, right=0.0) >= 1.0
+    usable = measured.usable & inside
+    if late > 0.0:
+        return replace(
+            measured, eta=np.column_stack([_at(when, measured, measured.eta[:, :2]), measured.psi]), usable=usable
+        )
+    moved = (_earlier(when, measured, nu) for nu in (measured.nu_raw, measured.nu))
+    return replace(measured, nu_raw=next(moved), nu=next(moved), usable=usable)
 
 
 def _at(when: Floats, measured: Measurements, values: Floats) -> Floats:
@@ -65,4 +76,11 @@ def estimate(measurements: Measurements) -> dict[str, Estimate]:
     return {} if found is None else {"seconds": found.solution.estimate(LATE, "s")}
 
 
-CHECK = Check("clock_offset", "Clocks of position and velocity", find, 30, estimate)
+CHECK = Check(
+    "clock_offset",
+    "Clocks of position and velocity",
+    find,
+    30,
+    estimate,
+    Lasting(0.0, float(SIZE[LATE]), lambda _: CHECKS.least_delay_s, says_of, corrected),
+)

@@ -6,13 +6,14 @@ hides the bias from this check; see `ferryid.effects.heading_bias`.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
-from math import degrees
+from math import degrees, radians
 
 import numpy as np
 
-from ferryid.diagnose.checks.check import Check, SensorFinding
-from ferryid.diagnose.checks.kinematics import ANGLE, Kinematics, kinematics
+from ferryid.diagnose.checks.check import Check, Lasting, SensorFinding
+from ferryid.diagnose.checks.kinematics import ANGLE, SIZE, Kinematics, kinematics
 from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
@@ -24,19 +25,27 @@ def find(measurements: Measurements) -> SensorFinding | None:
     if found is None or not found.found(ANGLE, np.radians(CHECKS.least_angle_deg)):
         return None
     angle = _angle(found)
-    side = "clockwise" if angle.value > 0.0 else "anticlockwise"
-    bias = float(found.solution.values[ANGLE])
-
-    def correct(measured: Measurements) -> Measurements:
-        return replace(measured, eta=measured.eta - np.array([0.0, 0.0, bias]))
-
+    values = {"angle": angle.value}
     return SensorFinding(
         "heading_bias",
         {"angle": angle},
-        f"The heading is {abs(angle.value):.1f} deg too far {side} of the axes in which the velocity was measured.",
-        correct,
+        says_of(values),
+        lambda measured: corrected(measured, values),
         found.evidence(ANGLE),
     )
+
+
+def says_of(values: Mapping[str, float]) -> str:
+    """Return to which side the heading is off, as a sentence."""
+    side = "clockwise" if values["angle"] > 0.0 else "anticlockwise"
+    return (
+        f"The heading is {abs(values['angle']):.1f} deg too far {side} of the axes in which the velocity was measured."
+    )
+
+
+def corrected(measured: Measurements, values: Mapping[str, float]) -> Measurements:
+    """Return measurements whose heading is without the bias."""
+    return replace(measured, eta=measured.eta - np.array([0.0, 0.0, radians(values["angle"])]))
 
 
 def estimate(measurements: Measurements) -> dict[str, Estimate]:
@@ -49,4 +58,11 @@ def _angle(found: Kinematics) -> Estimate:
     return found.solution.estimate(ANGLE, "deg", degrees(1.0))
 
 
-CHECK = Check("heading_bias", "Heading against course over ground", find, 50, estimate)
+CHECK = Check(
+    "heading_bias",
+    "Heading against course over ground",
+    find,
+    50,
+    estimate,
+    Lasting(0.0, degrees(SIZE[ANGLE]), lambda _: CHECKS.least_angle_deg, says_of, corrected),
+)

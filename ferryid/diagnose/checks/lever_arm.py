@@ -6,12 +6,13 @@ is silent; see `ferryid.effects.lever_arm`.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from ferryid.diagnose.checks.check import Check, SensorFinding
-from ferryid.diagnose.checks.kinematics import Kinematics, X, Y, kinematics
+from ferryid.diagnose.checks.check import Check, Lasting, SensorFinding
+from ferryid.diagnose.checks.kinematics import SIZE, Kinematics, X, Y, kinematics
 from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
@@ -33,21 +34,28 @@ def find(measurements: Measurements) -> SensorFinding | None:
     if not (found.found(X, least) or found.found(Y, least)):
         return None
     x, y = _place(found)
-    at = np.array([x.value, y.value])
-
-    def correct(measured: Measurements) -> Measurements:
-        one = np.ones(len(measured.t))
-        arm = np.column_stack([*to_world(at[0] * one, at[1] * one, measured.psi), 0.0 * one])
-        return replace(measured, eta=measured.eta - arm)
-
-    ends = ("ahead" if at[0] >= 0.0 else "astern", "to starboard" if at[1] >= 0.0 else "to port")
+    values = {"x": x.value, "y": y.value}
     return SensorFinding(
         "lever_arm",
         {"x": x, "y": y},
-        f"Positions belong to a point {abs(at[0]):.2f} m {ends[0]} and {abs(at[1]):.2f} m {ends[1]} of where velocities do.",
-        correct,
-        found.evidence(X if abs(at[0]) >= abs(at[1]) else Y),
+        says_of(values),
+        lambda measured: corrected(measured, values),
+        found.evidence(X if abs(x.value) >= abs(y.value) else Y),
     )
+
+
+def says_of(values: Mapping[str, float]) -> str:
+    """Return where positions were measured, as a sentence."""
+    x, y = values["x"], values["y"]
+    ends = ("ahead" if x >= 0.0 else "astern", "to starboard" if y >= 0.0 else "to port")
+    return f"Positions belong to a point {abs(x):.2f} m {ends[0]} and {abs(y):.2f} m {ends[1]} of where velocities do."
+
+
+def corrected(measured: Measurements, values: Mapping[str, float]) -> Measurements:
+    """Return measurements whose positions are those of the point where velocities were measured."""
+    one = np.ones(len(measured.t))
+    arm = np.column_stack([*to_world(values["x"] * one, values["y"] * one, measured.psi), 0.0 * one])
+    return replace(measured, eta=measured.eta - arm)
 
 
 def estimate(measurements: Measurements) -> dict[str, Estimate]:
@@ -60,4 +68,11 @@ def _place(found: Kinematics) -> tuple[Estimate, Estimate]:
     return found.solution.estimate(X, "m"), found.solution.estimate(Y, "m")
 
 
-CHECK = Check("lever_arm", "Position against velocity in turns", find, 60, estimate)
+CHECK = Check(
+    "lever_arm",
+    "Position against velocity in turns",
+    find,
+    60,
+    estimate,
+    Lasting(0.0, float(SIZE[X]), least_m, says_of, corrected),
+)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from ferryid.diagnose.checks import SensorFinding, examine
+from ferryid.diagnose.checks import SensorFinding, examine, examine_together
 from ferryid.diagnose.data.measurements import MeasuredLog
 from ferryid.effects.force_model import Measurements
 
@@ -22,11 +22,14 @@ class ScreenedLog:
         Without the sensors' errors.
     sensors
         These.
+    notes
+        In what it differs from the other logs of its campaign, as sentences.
     """
 
     measured: MeasuredLog
     measurements: Measurements
     sensors: tuple[SensorFinding, ...]
+    notes: tuple[str, ...] = ()
 
 
 def screen_sensors(log: MeasuredLog, progress: Callable[[str], None]) -> ScreenedLog:
@@ -40,3 +43,22 @@ def screen_sensors(log: MeasuredLog, progress: Callable[[str], None]) -> Screene
     progress("checking the sensors against each other")
     sensors, measurements = examine(log.measurements)
     return ScreenedLog(log, measurements, sensors)
+
+
+def screen_together(logs: Sequence[ScreenedLog], copies: Sequence[bool]) -> tuple[ScreenedLog, ...]:
+    """Return the logs of one vessel with what several of them show of their sensors pooled over all of them.
+
+    Parameters
+    ----------
+    logs
+        Each screened by itself.
+    copies
+        Which of them hold the motion of another.
+    """
+    examined = examine_together([one.measured.measurements for one in logs], [one.sensors for one in logs], copies)
+    return tuple(
+        ScreenedLog(log.measured, one.measurements, tuple(one.findings), tuple(one.notes))
+        if one.otherwise or one.notes
+        else log
+        for log, one in zip(logs, examined, strict=True)
+    )

@@ -222,6 +222,24 @@ class CheckThresholds:
     no_push: float = threshold(
         1e-6, "-", "share of a force that is left beside drag and lift, below which there is none", "derived: rounding"
     )
+    pooled_logs: int = threshold(
+        2,
+        "logs",
+        "that show a lasting error by themselves, from which on it is pooled over a campaign",
+        "convention: several",
+    )
+    pooled_scatter: float = threshold(
+        0.5,
+        "of the error",
+        "scatter between logs above which they have no value in common",
+        "convention: half; errors that change from log to log are no property of the vessel",
+    )
+    pooled_evidence: float = threshold(
+        8.0,
+        "nat",
+        "log evidence of all logs together that a lasting error must gain",
+        "convention: as an effect must in a campaign",
+    )
 
 
 CHECKS = CheckThresholds()

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from ferryid.diagnose.checks.check import Check, SensorFinding
-from ferryid.diagnose.checks.kinematics import SCALE, kinematics
+from ferryid.diagnose.checks.check import Check, Lasting, SensorFinding
+from ferryid.diagnose.checks.kinematics import SCALE, SIZE, kinematics
 from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
@@ -29,19 +30,26 @@ def find(measurements: Measurements) -> SensorFinding | None:
     factor = found.solution.estimate(SCALE, "-")
     narrow = factor.high - factor.low < CHECKS.unit_width * factor.value
     unit = [(value, text) for value, text in UNITS.items() if narrow and factor.low <= value <= factor.high]
-    right = unit[0][0] if unit else factor.value
-    scale = np.array([right, right, 1.0])
-
-    def correct(measured: Measurements) -> Measurements:
-        return replace(measured, nu_raw=measured.nu_raw / scale, nu=measured.nu / scale)
-
+    right = {"factor": unit[0][0] if unit else factor.value}
+    says = says_of({"factor": factor.value})
     return SensorFinding(
         "velocity_scale",
         {"factor": factor},
-        f"The speed measured is {factor.value:.3f} times that of the positions{': ' + unit[0][1] if unit else ''}.",
-        correct,
+        f"{says.removesuffix('.')}: {unit[0][1]}." if unit else says,
+        lambda measured: corrected(measured, right),
         found.evidence(SCALE),
     )
+
+
+def says_of(values: Mapping[str, float]) -> str:
+    """Return the factor, as a sentence."""
+    return f"The speed measured is {values['factor']:.3f} times that of the positions."
+
+
+def corrected(measured: Measurements, values: Mapping[str, float]) -> Measurements:
+    """Return measurements whose velocity is divided by a factor."""
+    scale = np.array([values["factor"], values["factor"], 1.0])
+    return replace(measured, nu_raw=measured.nu_raw / scale, nu=measured.nu / scale)
 
 
 def estimate(measurements: Measurements) -> dict[str, Estimate]:
@@ -50,4 +58,11 @@ def estimate(measurements: Measurements) -> dict[str, Estimate]:
     return {} if found is None else {"factor": found.solution.estimate(SCALE, "-")}
 
 
-CHECK = Check("velocity_scale", "Position against integrated velocity", find, 40, estimate)
+CHECK = Check(
+    "velocity_scale",
+    "Position against integrated velocity",
+    find,
+    40,
+    estimate,
+    Lasting(1.0, float(SIZE[SCALE]), lambda _: CHECKS.least_scale, says_of, corrected),
+)

@@ -7,11 +7,12 @@ but for a part that may grow with the rate: with that its whole length tells of 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ferryid.diagnose.checks.check import Check, SensorFinding
+from ferryid.diagnose.checks.check import Check, Lasting, SensorFinding
 from ferryid.diagnose.checks.regression import Solution, independence, step
 from ferryid.diagnose.checks.spans import LENGTH_S, STRIDE_S, Spans, spans
 from ferryid.diagnose.checks.thresholds import CHECKS
@@ -93,14 +94,19 @@ def find(measurements: Measurements) -> SensorFinding | None:
     if rates is None or rates.off < CHECKS.least_rate_scale or not rates.solution.certain(0, 1.0):
         return None
     factor = rates.solution.estimate(0, "-")
-    sign = " with its sign turned round," if factor.value < 0.0 else ""
     return SensorFinding(
         "yaw_rate_scale",
         {"factor": factor},
-        f"The yaw rate measured is{sign} {abs(factor.value):.3f} times that of the heading.",
+        says_of({"factor": factor.value}),
         lambda measured: corrected(measured, factor.value),
         {"time_s": rates.middle_s, "heading_rate_radps": rates.heading, "yaw_rate_radps": rates.gyro},
     )
+
+
+def says_of(values: Mapping[str, float]) -> str:
+    """Return the factor, as a sentence."""
+    sign = " with its sign turned round," if values["factor"] < 0.0 else ""
+    return f"The yaw rate measured is{sign} {abs(values['factor']):.3f} times that of the heading."
 
 
 def _step(Z: Floats, J: Floats, measured: Floats, problem: Spans) -> Solution | None:
@@ -152,4 +158,17 @@ def estimate(measurements: Measurements) -> dict[str, Estimate]:
     return {} if rates is None else {"factor": rates.solution.estimate(0, "-")}
 
 
-CHECK = Check("yaw_rate_scale", "Yaw rate against heading", find, 20, estimate)
+CHECK = Check(
+    "yaw_rate_scale",
+    "Yaw rate against heading",
+    find,
+    20,
+    estimate,
+    Lasting(
+        1.0,
+        float(SIZE[0]),
+        lambda _: CHECKS.least_rate_scale,
+        says_of,
+        lambda measured, values: corrected(measured, values["factor"]),
+    ),
+)

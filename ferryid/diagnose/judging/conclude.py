@@ -240,6 +240,7 @@ def survey_notes(log: ScreenedLog) -> tuple[str, ...]:
     return (
         *survey.doubts,
         *survey.left_out,
+        *log.notes,
         *(one for one in survey.motion.repairs if one.startswith(names)),
     )
 

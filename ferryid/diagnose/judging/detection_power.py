@@ -178,9 +178,7 @@ def recording_advice(every: Sequence[DetectionPower], axes: Sequence[str], setti
             f"for {listed([titled(title, ', '.join(of)) for title, of in names.items()])}, record {manoeuvre}"
             for manoeuvre, names in by_manoeuvre.items()
         ]
-        sentences.append(
-            f"This log would not have shown everything at its usual size. To make sure: {'; '.join(parts)}."
-        )
+        sentences.append(f"Not everything would have shown at its usual size. To make sure: {'; '.join(parts)}.")
     return sentences
 
 

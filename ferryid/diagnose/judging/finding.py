@@ -83,6 +83,8 @@ class Finding:
         Frequencies that hold most of it [Hz], where that is told.
     law
         Terms of an empirical law, of an effect without a name.
+    vessel
+        True for what the checks of the sensors show in all logs of a campaign together.
     labels
         Names of the columns of `evidence` for people, with unit: ``residual`` (of `before`, `after` and `explained`) and
         ``regressor``. Such as ``{"residual": "sway force left over [N]", "regressor": "heading [deg]"}``.
@@ -109,6 +111,7 @@ class Finding:
     course: Course | None = None
     band_hz: tuple[float, float] | None = None
     law: tuple[LawTerm, ...] = ()
+    vessel: bool = False
 
     @property
     def ends(self) -> tuple[tuple[str, float], ...]:

@@ -35,14 +35,18 @@ def compare_hidden_signals(
     return tuple(_beside(signal, values, measurements, findings) for signal, values in hidden.items())
 
 
-def with_gains(withheld: Sequence[Withheld], gains: Mapping[str, HiddenGain]) -> tuple[Withheld, ...]:
-    """Return hidden signals with how much of what each explains was found, by signal."""
-    return tuple(
-        replace(one, gain=gains[one.signal], says=f"{one.says} {gains[one.signal].says(one.signal)}")
-        if one.signal in gains
-        else one
-        for one in withheld
-    )
+def with_gains(
+    withheld: Sequence[Withheld], gains: Mapping[str, HiddenGain], *, told: bool = True
+) -> tuple[Withheld, ...]:
+    """Return hidden signals with how much of what each explains was found, by signal.
+
+    It is of all logs together: not `told` in words of each, where it is told of all.
+    """
+    return tuple(_gained(one, gains[one.signal], told=told) if one.signal in gains else one for one in withheld)
+
+
+def _gained(one: Withheld, gain: HiddenGain, *, told: bool) -> Withheld:
+    return replace(one, gain=gain, says=f"{one.says} {gain.says(one.signal)}" if told else one.says)
 
 
 def _beside(signal: str, values: Floats, measurements: Measurements, findings: Sequence[Finding]) -> Withheld:

@@ -100,11 +100,12 @@ def sensor_claims(log: ScreenedLog) -> tuple[Claim, ...]:
             Finding(
                 effect=one.effect,
                 instance=None,
-                probability=1.0,
+                probability=one.probability,
                 parameters=one.parameters,
                 axes=dict.fromkeys(AXES, 0.0),
                 intervals=(),
                 says=one.says,
+                vessel=one.vessel,
             ),
             Figures("sensor", doubt=_doubt(one, log.measurements.profile)),
         )

@@ -7,13 +7,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ferryid.diagnose.checks import clock_offset, heading_bias, held_samples, lever_arm, velocity_scale, yaw_rate_scale
+from ferryid.diagnose.checks import (
+    clock_offset,
+    examine,
+    heading_bias,
+    held_samples,
+    lever_arm,
+    refilter_velocity,
+    velocity_scale,
+    yaw_rate_scale,
+)
 from ferryid.diagnose.checks.check import SensorFinding
 from ferryid.diagnose.checks.regression import independence
 from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.effects.force_model import Measurements
 from ferryid.vessel import load_profile
-from ferryid.vessel.frames import to_world
+from ferryid.vessel.frames import to_body, to_world
 
 FERRY = load_profile("milliampere")
 STEP_S = 0.1
@@ -129,3 +138,19 @@ def test_a_clock_offset_is_corrected_in_a_log_that_is_long_enough(seconds: float
     assert ("not corrected" in found.says) == (seconds < 100.0)
     moved = found.correct(late)
     assert (moved is late) == (seconds < 100.0)
+
+
+def test_the_velocity_in_products_has_no_part_of_a_late_clock() -> None:
+    right = turning(3, 400.0)
+    late_by = 8
+    over_ground = np.column_stack(to_world(right.nu_raw[:, 0], right.nu_raw[:, 1], right.psi))
+    north, east = np.roll(over_ground, late_by, axis=0).T
+    nu_raw = np.column_stack([*to_body(north, east, right.psi), right.nu_raw[:, 2]])
+    # As it is made while a log is read: slow from the positions, which are not late, and fast from the velocities.
+    wrong = replace(right, nu_raw=nu_raw, usable=np.arange(len(nu_raw)) >= late_by)
+    steady, made = (refilter_velocity(one) for one in (right, wrong))
+    findings, corrected = examine(made)
+    assert [one.effect for one in findings] == ["clock_offset"]
+    holds(findings[0], seconds=-0.8)
+    rows = corrected.usable & (right.t > 10.0) & (right.t < 390.0)
+    assert np.abs(corrected.nu - steady.nu)[rows, :2].max() < 0.06

@@ -52,6 +52,10 @@ def test_the_sentence_stands_with_the_signal_that_was_hidden() -> None:
     assert found[0].gain is gain
     assert found[0].says == f"It was hidden. {gain.says('wind')}"
     assert found[1] is load
+    # Where it is told of all logs together, no log repeats it.
+    quiet = with_gains((wind, load), {"wind": gain}, told=False)
+    assert quiet[0].gain is gain
+    assert quiet[0].says == "It was hidden."
 
 
 def test_a_hidden_flow_is_bridged_where_the_sensor_was_silent() -> None:
