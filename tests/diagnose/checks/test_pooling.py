@@ -118,3 +118,9 @@ def test_one_log_alone_and_copies_of_it_are_no_campaign() -> None:
     found = examine_together([once, once, clean], own, [False, True, False])
     assert not any(finding.vessel for one in found for finding in one.findings)
     assert [len(one.findings) for one in found] == [1, 1, 0]
+    # A copy of a log of a campaign is corrected as the log is, and counts for nothing.
+    every = [once, once, late(turning(4))]
+    found = examine_together(every, [examine(one)[0] for one in every], [False, True, False])
+    assert all(one.findings == found[0].findings for one in found)
+    assert "2 of 2 logs show it by themselves" in found[0].findings[0].says
+    assert found[0].findings[0].parameters == together([once, every[2]])[0].findings[0].parameters
