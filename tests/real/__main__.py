@@ -17,6 +17,7 @@ PARTS: dict[str, Callable[[], None]] = {"fits": fits.write, "diagnoses": diagnos
 SECTIONS: dict[str, Callable[[], None]] = {
     "osaka": partial(diagnoses.write_again, diagnoses.osaka),
     "milliampere": partial(diagnoses.write_again, diagnoses.milliampere),
+    "gunnerus": partial(diagnoses.write_again, diagnoses.gunnerus),
 }
 APART: dict[str, Callable[[], None]] = {"campaign": campaign.write}
 """Made only where it is asked for."""

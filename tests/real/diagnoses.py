@@ -279,6 +279,14 @@ def gunnerus() -> str:
         pictures.raw(table.tvec[some].to_numpy(), rows), encoding="utf-8"
     )
     shares = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in straight.items())
+    factor, turn = witnesses.turned_by_course(table)
+
+    def judge(one: Diagnosis, finding: Finding) -> str:
+        if finding.effect == "yaw_rate_scale":
+            # The drift at both ends of the circles may differ by some degrees.
+            return agrees(finding.parameters["factor"], factor, 0.01)
+        return UNJUDGED
+
     return "\n".join(
         [
             "\n## R/V Gunnerus\n",
@@ -292,10 +300,12 @@ def gunnerus() -> str:
             f"{pace[0]:.2f} to {pace[4]:.2f} times the logged speed (5 to 95 %; quartiles {pace[1]:.2f} and "
             f"{pace[3]:.2f}, median "
             f"{pace[2]:.2f}), over a minute at {long[0]:.2f} to {long[4]:.2f} times.",
+            f"- *The yaw rate turns too far.* In whole circles it adds up to {factor:.3f} times the turn of the course, which "
+            f"positions alone give, over {turn:.0f} deg.",
             "",
             "![Raw rows](diagnosis-gunnerus-raw.svg)",
             "",
-            told("gunnerus", [str(path)], lambda one, finding: UNJUDGED)[0],
+            told("gunnerus", [str(path)], judge)[0],
             "",
             "**To record next:** the same manoeuvres with the time stamps of the sensors, feedback of azimuth "
             "and rpm instead of "

@@ -135,6 +135,27 @@ def position_pace(table: pd.DataFrame, rows: int) -> Floats:
     return np.quantile(ways[0] / ways[1], [0.05, 0.25, 0.5, 0.75, 0.95])
 
 
+def turned_by_course(table: pd.DataFrame, least_deg: float = 360.0, least_mps: float = 0.5) -> tuple[float, float]:
+    """Return the turn that Gunnerus's logged yaw rate adds up to over that of the course of the positions, in whole circles.
+
+    Course and heading differ by the drift, which is alike at both ends of a long turn. Beside it how far the course turned, in
+    all circles together [deg].
+    """
+    t, rate = table.tvec.to_numpy(), table.r.to_numpy()
+    way = np.column_stack([np.gradient(table.N, t), np.gradient(table.E, t)])
+    course = np.degrees(np.unwrap(np.arctan2(way[:, 1], way[:, 0])))
+    turn = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t))])
+    side = np.sign(np.convolve(rate, np.ones(61) / 61.0, mode="same"))
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(side)) + 1, [len(t)]])
+    by_rate = by_course = 0.0
+    for first, end in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+        whole = abs(course[end - 1] - course[first])
+        if whole >= least_deg and np.hypot(*way[first:end].T).min() > least_mps:
+            by_rate += abs(turn[end - 1] - turn[first])
+            by_course += whole
+    return by_rate / by_course, by_course
+
+
 def idle(measurements: Measurements, least_s: float = 3.0) -> tuple[float, float, float] | None:
     """Return the longest time without any recorded force [s], and the surge speeds at its slowest and fastest after [m/s]."""
     still = np.abs(measurements.parts).sum(axis=(1, 2)) == 0.0
