@@ -36,6 +36,14 @@ def products(u: float, v: float, r: float, out: Floats) -> None:
     out[17], out[18], out[19], out[20] = u * v, u * r, u * v, u * r
 
 
+PRODUCTS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 16, 17, 18)
+"""Of the products of damping those that differ; X are the first three."""
+PRODUCT_OF = (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 3, 4, 5, 7, 8, 9, 10, 11, 12, 11, 12)
+"""Which of these every coefficient of damping multiplies."""
+AHEAD = 3
+"""How many of them push ahead."""
+
+
 @borrowing
 def masses(i: int, hull: Floats, load: Floats) -> tuple[float, float, float, float, float]:
     """Return the entries of a row's mass matrix, that of the load included."""
@@ -204,6 +212,57 @@ def slopes(
                 X, Y, N = push if axis == 0 else 0.0, push if axis == 1 else 0.0, push if axis == 2 else 0.0
                 out[i, 0, q], out[i, 1, q], out[i, 2, q] = solved(mass, X, Y, N)
     return out
+
+
+@compiled
+def pushes(nu: Floats) -> Floats:
+    """Return unit responses to damping in still water: each of `PRODUCTS` as an acceleration along one axis, shape (n, 3, 23).
+
+    First those ahead, then the others to starboard, then the same as turns.
+    """
+    count = len(PRODUCTS) - AHEAD
+    out, product = np.zeros((nu.shape[0], 3, AHEAD + 2 * count)), np.empty(len(DAMPED))
+    for i in range(nu.shape[0]):
+        products(nu[i, 0], nu[i, 1], nu[i, 2], product)
+        for k in range(AHEAD):
+            out[i, 0, k] = product[k]
+        for k in range(count):
+            out[i, 1, AHEAD + k] = out[i, 2, AHEAD + count + k] = product[PRODUCTS[AHEAD + k]]
+    return out
+
+
+@compiled
+def damping_changes(responses: Floats, hull: Floats, places: Ints, moves: Floats, out: Floats) -> None:
+    """Fill in by how much an acceleration changes if coefficients of damping move one by one, in still water.
+
+    Parameters
+    ----------
+    responses
+        `pushes`, or means of them along other axes, shape (J, 3, 23).
+    hull
+        Shape (26,).
+    places, moves
+        As of `slopes`; masses are left as they are.
+    out
+        Shape (J, 3, q).
+    """
+    count = len(PRODUCTS) - AHEAD
+    mass = (hull[0], hull[1], hull[2], hull[3], hull[4])
+    place = np.empty((places.shape[0], 2), np.int64)
+    weight = np.empty((places.shape[0], 2))
+    for q in range(places.shape[0]):
+        k = max(places[q] - MASSES, 0)
+        axis, product = DAMPED[k], PRODUCT_OF[k]
+        X, Y, N = moves[q] if axis == 0 else 0.0, moves[q] if axis == 1 else 0.0, moves[q] if axis == 2 else 0.0
+        ahead, aside, turn = solved(mass, X, Y, N)
+        place[q, 0], place[q, 1] = product, product if axis == 0 else count + product
+        weight[q, 0], weight[q, 1] = ahead if axis == 0 else aside, 0.0 if axis == 0 else turn
+    for j in range(responses.shape[0]):
+        for i in range(3):
+            for q in range(places.shape[0]):
+                if places[q] >= MASSES:
+                    first, second = responses[j, i, place[q, 0]], responses[j, i, place[q, 1]]
+                    out[j, i, q] = weight[q, 0] * first + weight[q, 1] * second
 
 
 @compiled

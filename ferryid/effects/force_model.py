@@ -222,6 +222,12 @@ def hull_changes(force_model: ForceModel, places: Ints, moves: Floats) -> Floats
     return _from_antenna(force_model, changes)
 
 
+def plainly_damped(force_model: ForceModel) -> bool:
+    """Return whether a force model's damping is that of its hull in still water alone, as the navigation's origin feels it."""
+    changed = (force_model.flow, force_model.load, force_model.damping_factor)
+    return all(one is None for one in changed) and force_model.antenna == (0.0, 0.0) and force_model.turned == 0.0
+
+
 def corrected(force_model: ForceModel, measurements: Measurements) -> ForceModel:
     """Return the force model with corrected measurements, and with the ambient forces that follow from these."""
     if force_model.ambient is None:

@@ -15,7 +15,7 @@ from tests.evidence import stamp
 
 REPORT = Path(__file__).resolve().parents[2] / "reports" / "benchmarks.md"
 # In the order of the page; every one exposes run(quick) -> Section.
-MODULES = ("ingest", "identify", "archive", "simulate", "long")
+MODULES = ("ingest", "identify", "archive", "simulate", "diagnosis", "long")
 
 
 def main() -> int:

@@ -17,7 +17,7 @@ from ferryid.diagnose.inference.newton_step import newton_step
 from ferryid.diagnose.inference.noise_estimation import excerpt, fit_noise
 from ferryid.diagnose.inference.noise_model import NoiseModel, WhiteningFilter, make_whitening_filter
 from ferryid.diagnose.inference.thresholds import INFERENCE
-from ferryid.diagnose.inference.weak_form import Windows, steps_of
+from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.effects.effect import HELD
 from ferryid.effects.force_model import ForceModel
 from ferryid.types import Floats, Ints
@@ -114,7 +114,7 @@ class EstimationProblem:
     @cached_property
     def steps(self) -> Windows:
         """The steps of the filter, over the same rows as the windows."""
-        return steps_of(self.windows)
+        return self.windows.steps
 
     @cached_property
     def excerpt(self) -> Windows:
@@ -380,7 +380,7 @@ def estimation_problem(windows: Windows, plain: ForceModel, hull_spread: Floats)
     What an effect leaves in the gaps is in that noise too, until a hypothesis that holds takes it out: see
     `ferryid.diagnose.inference.search`.
     """
-    first = excerpt(steps_of(windows))
+    first = excerpt(windows.steps)
     problem = EstimationProblem(
         windows,
         plain,

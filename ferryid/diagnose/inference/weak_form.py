@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from ferryid.compiled import compiled
 from ferryid.diagnose.inference.thresholds import INFERENCE
-from ferryid.effects.equations_of_motion import over_ground, to_ground
-from ferryid.effects.force_model import ForceModel, Measurements, as_measured, hull_changes
+from ferryid.effects.equations_of_motion import MASSES, damping_changes, over_ground, pushes, to_ground
+from ferryid.effects.force_model import ForceModel, Measurements, as_measured, hull_changes, plainly_damped
 from ferryid.regression import window_weights
 from ferryid.types import Floats, Ints
 
@@ -111,10 +111,37 @@ class Windows:
 
         `places` and `moves` as in `ferryid.effects.force_model.hull_changes`.
         """
+        if force_model.measurements is self.measurements and plainly_damped(force_model):
+            return self._changes_in_still_water(force_model, places, moves)
         changes = hull_changes(force_model, places, moves)
         if self.channels[0]:
             to_ground(changes, *self.measurements.pointing)
         return self.mean(changes)
+
+    def _changes_in_still_water(self, force_model: ForceModel, places: Ints, moves: Floats) -> Floats:
+        """Return `hull_changes` where damping is linear in the coefficients and known but for the masses."""
+        out = np.empty((len(self.starts), 3, len(places)))
+        heavy = places < MASSES
+        if heavy.any():
+            changes = hull_changes(force_model, places[heavy], moves[heavy])
+            if self.channels[0]:
+                to_ground(changes, *self.measurements.pointing)
+            out[:, :, heavy] = self.mean(changes)
+        damping_changes(self.damping_responses, force_model.hull, places, moves, out)
+        return out
+
+    @cached_property
+    def damping_responses(self) -> Floats:
+        """Mean of `ferryid.effects.equations_of_motion.pushes` in every window along the channels, shape (J, 3, 23)."""
+        every = pushes(np.ascontiguousarray(self.measurements.nu))
+        if self.channels[0]:
+            to_ground(every, *self.measurements.pointing)
+        return self.mean(every)
+
+    @cached_property
+    def steps(self) -> Windows:
+        """`steps_of` these windows."""
+        return steps_of(self)
 
 
 STEPS_A_WINDOW = 20

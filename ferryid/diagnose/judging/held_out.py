@@ -146,7 +146,7 @@ def held_out_evidence(problem: EstimationProblem, found: Fit) -> HeldOutEvidence
         return None
     base = held_out(problem, folds, ())
     full = held_out(problem, folds, found.candidates, found.values, found)
-    proofs = tuple(_proof(problem, folds, found, full, base, index) for index in range(len(found.candidates)))
+    proofs = tuple(over(lambda index: _proof(problem, folds, found, full, base, index), range(len(found.candidates))))
     return HeldOutEvidence(
         folds,
         compare_held_out(problem, folds, base, full),
@@ -300,14 +300,15 @@ def _proof(problem: EstimationProblem, folds: Folds, found: Fit, full: HeldOut, 
     without = held_out(problem, folds, rest, start, found) if rest else base
     made = compare_held_out(problem, folds, without, full)
     in_its_place = placebos(problem, candidate, values)
-    alike = imitable(problem, candidate, in_its_place[HEADING], values) if HEADING in in_its_place else 0.0
+    alone = list(in_its_place) == [HEADING]
+    alike = imitable(problem, candidate, in_its_place[HEADING], values) if alone else 0.0
 
     def gains_of_placebos(weighed: EstimationProblem, bare: HeldOut, beside: Fit | None = None) -> dict[str, Floats]:
-        judged = {
-            name: held_out(weighed, folds, [*rest, placebo], [*start, placebo.start], beside)
-            for name, placebo in in_its_place.items()
-        }
-        return {name: _gains(weighed, folds, bare.gaps, one.gaps) for name, one in judged.items()}
+        def gained(placebo: Candidate) -> Floats:
+            made = held_out(weighed, folds, [*rest, placebo], [*start, placebo.start], beside)
+            return _gains(weighed, folds, bare.gaps, made.gaps)
+
+        return dict(zip(in_its_place, over(gained, in_its_place.values()), strict=True))
 
     gains, by_name = _gains(problem, folds, without.gaps, full.gaps), gains_of_placebos(problem, without, found)
     picks = draws(folds.block)

@@ -28,6 +28,7 @@ from ferryid.diagnose.judging.finding import UNKNOWN, Finding, LawTerm
 from ferryid.diagnose.judging.locate import Location, locate
 from ferryid.diagnose.judging.sparse_regression import Law, select_law
 from ferryid.diagnose.judging.thresholds import JUDGING
+from ferryid.diagnose.parallel import over
 from ferryid.effects.force_model import ForceModel, Measurements
 from ferryid.types import AXES, Floats
 
@@ -152,8 +153,9 @@ def find_displaced(problem: EstimationProblem, kept: Fit) -> tuple[int, ...]:
     folds = folds_of(problem.windows)
     if folds is None:
         return ()
-    every = (i for i, one in enumerate(kept.candidates) if not is_brief(problem, one))
-    return tuple(i for i in every if _displaced(problem, kept, i, folds))
+    every = [i for i, one in enumerate(kept.candidates) if not is_brief(problem, one)]
+    found = over(lambda i: _displaced(problem, kept, i, folds), every)
+    return tuple(i for i, displaced in zip(every, found, strict=True) if displaced)
 
 
 def _displaced(problem: EstimationProblem, kept: Fit, index: int, folds: Folds) -> bool:

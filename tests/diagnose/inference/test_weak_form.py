@@ -74,8 +74,9 @@ def test_a_current_leaves_no_gap_once_it_is_in_the_force_model() -> None:
     assert np.abs(seen.gap(plain)).max() > 2e-3
 
 
+@pytest.mark.parametrize("still", [True, False], ids=["still water", "current"])
 @pytest.mark.parametrize("placed", [True, False], ids=["positions", "velocities"])
-def test_changes_with_the_hull_are_those_of_the_gap(placed: bool) -> None:
+def test_changes_with_the_hull_are_those_of_the_gap(placed: bool, still: bool) -> None:
     measurements, _ = sailed(30.0)
     if not placed:
         measurements = replace(
@@ -83,8 +84,10 @@ def test_changes_with_the_hull_are_those_of_the_gap(placed: bool) -> None:
         )
     seen = windows(measurements, 8.0, 2.0)
     plain = still_air(seen.measurements)
-    places = np.flatnonzero(plain.hull)
-    moves = 0.1 * plain.hull[places]
+    if not still:
+        plain = replace(plain, flow=np.tile([0.3, -0.2], (len(seen.measurements.t), 1)))
+    places = np.arange(len(plain.hull))
+    moves = np.where(plain.hull != 0.0, 0.1 * plain.hull, 40.0)
     found = seen.hull_changes(plain, places, moves)
     for q, (place, move) in enumerate(zip(places, moves, strict=True)):
         hull = plain.hull.copy()
