@@ -222,10 +222,14 @@ def hull_changes(force_model: ForceModel, places: Ints, moves: Floats) -> Floats
     return _from_antenna(force_model, changes)
 
 
+def unloaded(force_model: ForceModel) -> bool:
+    """Return whether masses are those of a force model's hull alone, and felt where its origin is."""
+    return force_model.load is None and force_model.antenna == (0.0, 0.0) and force_model.turned == 0.0
+
+
 def plainly_damped(force_model: ForceModel) -> bool:
-    """Return whether a force model's damping is that of its hull in still water alone, as the navigation's origin feels it."""
-    changed = (force_model.flow, force_model.load, force_model.damping_factor)
-    return all(one is None for one in changed) and force_model.antenna == (0.0, 0.0) and force_model.turned == 0.0
+    """Return whether a force model is `unloaded` and its damping that of its hull in still water."""
+    return unloaded(force_model) and force_model.flow is None and force_model.damping_factor is None
 
 
 def corrected(force_model: ForceModel, measurements: Measurements) -> ForceModel:

@@ -16,7 +16,7 @@ import numpy as np
 from ferryid.diagnose.inference.estimation import Candidate, apply_candidates
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.effects.effect import Parameter
-from ferryid.effects.force_model import COEFFICIENTS, ForceModel
+from ferryid.effects.force_model import COEFFICIENTS, ForceModel, unloaded
 from ferryid.types import Floats, Ints
 
 INDUCED = ("X_vr", "X_vv")
@@ -189,12 +189,18 @@ class Campaign:
         slopes = np.zeros((len(member.windows.starts), 3, len(self.hull.mean)))
         free = self.hull.free[self.hull.free < n]
         moves = DIFFERENCE_STEP * self.hull.spread[free]
-        changes = member.windows.hull_changes(self.force_model(i, common, own), free, moves)
-        slopes[:, :, free] = member.windows.along_vessel(changes) / DIFFERENCE_STEP
+        force_model, windows = self.force_model(i, common, own), member.windows
+        changes = windows.hull_changes(force_model, free, moves)
+        slopes[:, :, free] = windows.along_vessel(changes) / DIFFERENCE_STEP
         rest = self.hull.free[self.hull.free >= n]
-        here = self.gap(i, common, own)
-        for k in rest.tolist():
-            slopes[:, :, k] = (self.gap(i, _moved(common, k), own) - here) / DIFFERENCE_STEP
+        if rest.size and force_model.measurements is windows.measurements and unloaded(force_model):
+            # A force ahead, of which the mass alone makes an acceleration.
+            drag = windows.along_vessel(windows.drift_responses)[:, :, rest - n] / force_model.hull[0]
+            slopes[:, :, rest] = drag * self.hull.spread[rest]
+        elif rest.size:
+            here = self.gap(i, common, own)
+            for k in rest.tolist():
+                slopes[:, :, k] = (self.gap(i, _moved(common, k), own) - here) / DIFFERENCE_STEP
         return slopes if self.hull.together is None else slopes @ self.hull.together
 
     def linearised(self, i: int, common: Floats, own: Floats, hull_slopes: Floats) -> tuple[Floats, Floats]:

@@ -139,6 +139,16 @@ class Windows:
         return self.mean(every)
 
     @cached_property
+    def drift_responses(self) -> Floats:
+        """Mean in every window of an acceleration ahead of v r, and of one of v v, along the channels, shape (J, 3, 2)."""
+        _, v, r = self.measurements.nu.T
+        every = np.zeros((len(v), 3, 2))
+        every[:, 0, 0], every[:, 0, 1] = v * r, v * v
+        if self.channels[0]:
+            to_ground(every, *self.measurements.pointing)
+        return self.mean(every)
+
+    @cached_property
     def steps(self) -> Windows:
         """`steps_of` these windows."""
         return steps_of(self)

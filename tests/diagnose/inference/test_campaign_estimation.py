@@ -77,6 +77,20 @@ def test_every_log_keeps_its_own_wind_beside_the_common_hull() -> None:
         assert (np.abs(value - wind) < 3.0 * np.sqrt(np.diag(covariance))).all()
 
 
+@pytest.mark.parametrize("turned", [0.0, 0.1], ids=["kept responses", "moved one by one"])
+def test_slopes_by_the_hull_are_those_of_the_gaps_drag_of_drift_included(turned: float) -> None:
+    made = campaign()
+    drag = replace(made.hull, spread=np.append(SPREAD, [30.0, 60.0]))
+    first = replace(made.members[0], plain=replace(made.members[0].plain, turned=turned))
+    made = replace(made, hull=drag, members=(first, *made.members[1:]))
+    common, own = 0.1 * np.ones(made.g), np.zeros(made.l)
+    slopes = made.hull_slopes(0, common, own)
+    for k in made.hull.free.tolist():
+        ends = [made.gap(0, common + side * 1e-4 * np.eye(made.g)[k], own) for side in (1.0, -1.0)]
+        by_ends = (ends[0] - ends[1]) / 2e-4
+        np.testing.assert_allclose(slopes[:, :, k], by_ends, rtol=0.0, atol=0.02 * np.abs(by_ends).max())
+
+
 def test_a_condition_that_is_rare_needs_more_evidence() -> None:
     made = fitted()
     rare = tuple(replace(one, conditions=(replace(WIND, log_alternatives=3.0),)) for one in made.campaign.members)
