@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from ferryid import api
+from ferryid.report.outcome import Outcome
 from ferryid.errors import FerryIdError
 from ferryid.identify import FitSettings
 from ferryid.report import outcome as outcome_module
@@ -91,3 +92,9 @@ def test_what_cannot_be_used_is_refused_as_by_the_commands(tmp_path: Path) -> No
     with pytest.raises(FerryIdError, match="no such file or folder"):
         api.fit(tmp_path / "missing.mcap", "milliampere", out=tmp_path)
     assert not any(tmp_path.iterdir())
+
+
+def test_a_session_shows_one_line_of_a_result() -> None:
+    assert repr(Outcome({"schema": "ferryid.fit/1", "rows": [0] * 9000}, "Accepted: yes\nand more")) == (
+        "<ferryid.fit/1: Accepted: yes>"
+    )

@@ -111,7 +111,10 @@ def _signal(
                 [
                     doubt,
                     "" if field.order is not None or measured else UNKNOWN_ORDER,
-                    "what this output of the autopilot drives: a thruster, a rudder or a gear" if is_output else "",
+                    "what this output of the autopilot drives: a thruster, or a rudder, which is an actuator of kind "
+                    '"propeller_rudder" with NAME.rudder.command'
+                    if is_output
+                    else "",
                 ],
             )
         ),

@@ -29,6 +29,12 @@ _ARRAYS = (
 """Topics of PX4 that are arrays without names of their elements: what they are. Its quaternions begin with the scalar."""
 
 
+def with_frames(groups: Sequence[FieldGroup], topics: Sequence[Topic]) -> list[FieldGroup]:
+    """Return groups with the frame that the formats of the autopilots state: both keep poses in NED."""
+    stated = {topic.name for topic in topics if topic.encoding in ("ulog", "dataflash")}
+    return [replace(one, frame="NED") if one.topic in stated else one for one in groups]
+
+
 def autopilot_groups(topics: Sequence[Topic]) -> list[FieldGroup]:
     """Return attitude and yaw rate of PX4; nothing for a log of something else."""
     by_name = {topic.name.strip("/"): topic for topic in topics if topic.encoding == "ulog" and topic.count > 1}

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ferryid.draft.actuator_fields import actuator_fields, parted, shared_topics
 from ferryid.draft.actuators import UNKNOWN_ORDER, DraftedActuator, drafted_actuators
-from ferryid.draft.autopilots import autopilot_fields, autopilot_groups, moving
+from ferryid.draft.autopilots import autopilot_fields, autopilot_groups, moving, with_frames
 from ferryid.draft.fields import navigation_groups
 from ferryid.draft.kinematics import navigation_signals
 from ferryid.draft.mapped import MappedSignal
@@ -80,7 +80,7 @@ def draft_profile(log: str | Path, like: Profile | None = None, ranges: TimeRang
     reader = open_log(log, None if like is None else like.table)
     topics = reader.topics
     autopilot = autopilot_fields(topics)
-    groups = [*navigation_groups(topics), *autopilot_groups(topics)]
+    groups = with_frames([*navigation_groups(topics), *autopilot_groups(topics)], topics)
     fields, winds = autopilot or actuator_fields(topics), wind_fields(topics)
     if not groups and not fields and any("named by their place" in topic.note for topic in topics):
         raise FerryIdError(

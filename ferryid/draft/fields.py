@@ -143,6 +143,8 @@ class FieldGroup:
         ``geodetic`` (latitude first), ``quaternion``, or empty.
     rate_hz
         Messages per second, of the whole log.
+    frame
+        The frame of a world that the log's format states, empty where it states none.
     """
 
     kind: str
@@ -150,6 +152,7 @@ class FieldGroup:
     fields: tuple[str, ...]
     form: str = ""
     rate_hz: float = 0.0
+    frame: str = ""
 
     @property
     def label(self) -> str:

@@ -154,6 +154,8 @@ def _preference(one: _Agreement) -> tuple[float, ...]:
 def _named_frame(pose: _Pose) -> str:
     """Return the frame that a topic's or field's name states, or an empty string."""
     for group in (pose.position, pose.heading):
+        if group is not None and group.frame:
+            return group.frame
         if group is not None:
             words = {word for name in (group.topic, *group.fields) for word in words_of(name)}
             if "enu" in words:

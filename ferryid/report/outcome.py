@@ -14,7 +14,7 @@ LARGEST_SHOWN = 8 << 20
 """A page beyond this many bytes is linked in a notebook, not shown: the notebook would keep all of it."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Outcome:
     """The result of a command; a notebook shows its text.
 
@@ -39,11 +39,15 @@ class Outcome:
     def __str__(self) -> str:
         return self.text
 
+    def __repr__(self) -> str:
+        """Return the form of the result and its first line; `print` shows all of it."""
+        return f"<{self.json.get('schema', type(self).__name__)}: {self.text.partition(chr(10))[0]}>"
+
     def _repr_html_(self) -> str:
         return f"<pre>{escape(self.text)}</pre>"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Report(Outcome):
     """A result with a page, which a notebook shows in its place."""
 

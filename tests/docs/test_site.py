@@ -31,7 +31,10 @@ def test_it_builds_strictly_and_needs_no_network(tmp_path: Path) -> None:
     copytree(ROOT / "docs", tmp_path / "docs")
     run = built(tmp_path)
     assert run.returncode == 0, run.stderr
-    pages = {path.stem: path.read_text(encoding="utf-8") for path in (tmp_path / "site").glob("*.html")}
+    pages = {path.stem: path.read_text(encoding="utf-8") for path in (tmp_path / "site").rglob("*.html")}
+    assert {"first-fit", "concealed-wind", "planning"} <= pages.keys()
+    assert "<table" in pages["first-fit"]
+    assert ".svg" in pages["first-fit"]
     equations = sum(one.language == "math" for page in PAGES for one in blocks(page))
     assert sum(text.count('display="block"') for text in pages.values()) == equations > 30
     for name, text in pages.items():

@@ -115,6 +115,8 @@ def test_a_draft_from_px4(trial: Columns, tmp_path: Path) -> None:
         "motor1.rudder.command": ("/actuator_servos", ("control[0]",), "fraction", ""),
     }
     assert [(one.name, one.kind) for one in draft.actuators] == [("motor1", "propeller_rudder")]
+    # The format states its frames.
+    assert not [one for one in draft.signals if one.doubts]
 
 
 def test_the_attitude_of_px4_is_a_heading(trial: Columns, tmp_path: Path) -> None:
