@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 from ferryid import api
-from ferryid.report.outcome import Outcome
 from ferryid.errors import FerryIdError
 from ferryid.identify import FitSettings
 from ferryid.report import outcome as outcome_module
+from ferryid.report.outcome import Outcome
 from ferryid.vessel import load_profile
 
 ROOT = Path(__file__).resolve().parents[1]
