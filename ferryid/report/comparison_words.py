@@ -119,7 +119,7 @@ def number(value: float, pattern: str = ".3g") -> str:
 
 
 def headline(result: ComparisonResult) -> str:
-    """Return which model errs least on each axis, over all logs, and whether that is more than chance."""
+    """Return which model errs least on each axis, over all logs, whether that is more than chance, and what to keep."""
     known = scopes(result)
     if not known:
         return f"{counted(len(result.models), 'model')} by their coefficients alone: no log was given to judge them on."
@@ -139,7 +139,14 @@ def headline(result: ComparisonResult) -> str:
             sure = "which may be chance" if isfinite(own[0].p) else "with too little data to decide"
         groups.setdefault((best, sure), []).append(axis)
     told = [f"{best} on {listed(axes)}, {sure}" for (best, sure), axes in groups.items()]
-    return f"Least force error, {title}: {'; '.join(told)}."
+    kept = ""
+    if BASE in result.labels and len(result.labels) > 1:
+        shown = [
+            row for row in result.statements
+            if (row.on, row.kind, row.second) == (on, "force", BASE) and row.better and row.evidence
+        ]  # fmt: skip
+        kept = "" if shown else "No fitted model is shown to be better than the profile's hull: keep the hull. "
+    return f"{kept}Least force error, {title}: {'; '.join(told)}."
 
 
 def told_horizon(scope: CommonErrors) -> int:

@@ -352,7 +352,7 @@ def _provenance(result: FitOutcome) -> list[dict[str, str]]:
     model = result.model
     rows = [
         ("model", f"{model.name}@{model.version}, ferryid {model.ferryid_version}, {model.created}"),
-        ("settings", ", ".join(f"{key} = {value}" for key, value in model.settings.items())),
+        ("settings", ", ".join(f"{key} = {value}" for key, value in model.settings.items() if value is not None)),
         ("base model scaled by", ", ".join(f"{key} = {value:g}" for key, value in model.scale.items())),
     ]
     known = [

@@ -118,7 +118,11 @@ def test_what_has_seen_the_log_is_no_evidence() -> None:
     ("p", "told"), [(0.001, "one on surge, sway and yaw, beyond chance."), (0.5, "which may be chance.")]
 )
 def test_the_headline_says_who_errs_least_and_how_surely(p: float, told: str) -> None:
-    assert comparison_words.headline(result(("one", "two", BASE), p)).endswith(told)
+    headline = comparison_words.headline(result(("one", "two", BASE), p))
+    assert headline.endswith(told)
+    advice = "No fitted model is shown to be better than the profile's hull: keep the hull. Least force error"
+    assert headline.startswith(advice) == (p > 0.05)
+    assert "keep the hull" not in comparison_words.headline(result(("one", "two"), p))
 
 
 def test_too_few_blocks_are_too_little_data() -> None:
