@@ -233,7 +233,12 @@ def signals_over_time(timeline: Timeline) -> str:
                 )
             ax.set_title(strip.label, fontsize=9, loc="left", pad=2)
             if len(strip.traces) > 1:
-                ax.legend(fontsize=7, loc="upper right", ncols=min(len(strip.traces), 4))
+                # Beside the title, where no line can lie below it.
+                ax.legend(
+                    fontsize=6.5, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1, borderpad=0.0,
+                    columnspacing=0.8, handlelength=1.2, handletextpad=0.4, labelspacing=0.2, ncols=4,
+                )  # fmt: skip
         axes[-1].set_xlabel("time [s]")
-        figure.subplots_adjust(hspace=0.45)
+        rows = max((len(strip.traces) + 3) // 4 for strip in timeline.strips)
+        figure.subplots_adjust(hspace=0.3 + 0.15 * rows)
         return svg_text(figure)
