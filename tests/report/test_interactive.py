@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.judging.diagnosis import Diagnosis
+from ferryid.report.batch_page import render
 from ferryid.report.diagnosis_report import report
 from ferryid.types import Floats
 from tests.report.browser import CHROMIUM, Page, browser
 from tests.report.pages import NEEDS_UPLOT
+from tests.report.test_batch_page import hostile
 from tests.report.test_diagnosis import T, diagnosis
 
 pytestmark = [
@@ -295,3 +297,15 @@ def test_another_log_is_laid_over_this_one(page: Page, tmp_path: Path) -> None:
     page.settle()
     assert page.do(f"{STATE}.strips.rows[0].plot.series.length") == len(series) - 2
     assert page.faults == []
+
+
+def test_a_batch_on_paper_is_whole_and_has_no_filters(page: Page, tmp_path: Path) -> None:
+    path = tmp_path / "index.html"
+    path.write_text(render(hostile()), encoding="utf-8")
+    page.open(path, 760)
+    assert page.do("getComputedStyle(document.querySelector('form')).display") != "none"
+    page.send("Emulation.setEmulatedMedia", media="print")
+    assert page.do("getComputedStyle(document.querySelector('form')).display") == "none"
+    cut = "[...document.querySelectorAll('.scroll')].filter((one) => one.scrollWidth > one.clientWidth + 1).length"
+    assert page.do(cut) == 0
+    page.send("Emulation.setEmulatedMedia", media="")
