@@ -65,6 +65,9 @@ class Measurements:
         Mass [kg] and place [m] aboard, shape (n, 2), or None.
     usable
         Rows on which everything was measured, shape (n,).
+    rudders
+        Thrust of one propeller before deduction [N] and angle of the rudder behind it [rad], NaN for actuators without a
+        rudder, shape (n, k, 2), or None for a vessel without one.
     repeats
         Where old values were repeated and taken out before: places of the channels among the columns of `eta` and `nu_raw`,
         and times of the last right sample before and of the first one after [s].
@@ -81,6 +84,7 @@ class Measurements:
     wind: Floats | None = None
     current: Floats | None = None
     payload: Floats | None = None
+    rudders: Floats | None = None
     repeats: tuple[tuple[tuple[int, ...], float, float], ...] = ()
 
     @property

@@ -13,6 +13,7 @@ from ferryid.types import Flags, Floats
 from ferryid.vessel import actuator_columns, applied_force
 from ferryid.vessel.hull import current_in_body
 from ferryid.vessel.profile import Profile
+from ferryid.vessel.thrusters import propellers_before_rudders
 
 
 def hull_force_model(measurements: Measurements, hull: Floats) -> ForceModel:
@@ -61,6 +62,16 @@ def actuator_forces(
     return np.stack(parts, axis=1), np.column_stack(angles)
 
 
+def rudder_states(
+    profile: Profile, columns: Mapping[str, Floats], through_water: Floats, usable: Flags
+) -> Floats | None:
+    """Return `Measurements.rudders`, bridged over gaps; arguments of `actuator_forces`."""
+    states = propellers_before_rudders(profile, columns, through_water)
+    if states is None:
+        return None
+    return np.stack([interpolate_gaps(one, usable) for one in np.moveaxis(states, 1, 0)], axis=1)
+
+
 def interpolate_gaps(values: Floats, usable: Flags, *, held: bool = False) -> Floats:
     """Return values with NaN replaced by what lies between, or was last, on usable rows; all NaN stays so."""
     result = values.copy()
@@ -97,6 +108,7 @@ def measurements_of_motion(track: Track, motion: Motion, profile: Profile) -> Me
         wind=None if motion.wind is None else interpolate_gaps(motion.wind, rows),
         current=None if motion.current is None else interpolate_gaps(motion.current, rows),
         payload=None if motion.payload is None else interpolate_gaps(motion.payload, rows, held=True),
+        rudders=rudder_states(profile, track.columns, through_water, np.ones_like(rows)),
     )
 
 

@@ -1,4 +1,7 @@
-"""Thruster gain: one thruster gives more or less force than its curve says, from the start or from a time on."""
+"""Thruster gain: one thruster gives more or less force than its curve says, from the start or from a time on.
+
+A rudder behind a propeller feels the thrust that acts: its force changes by what the slipstream does, and not by the factor.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,9 @@ from ferryid.effects.effect import Effect, Parameter, Values, span
 from ferryid.effects.force_model import ForceModel
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import AXES, Floats
+from ferryid.vessel.hull import current_in_body
 from ferryid.vessel.profile import Profile
+from ferryid.vessel.thrusters import force_at, rudder_behind
 
 
 def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
@@ -23,10 +28,20 @@ def instances(profile: Profile) -> tuple[str | None, ...]:
 
 
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
-    """Multiply the force of the thruster."""
-    k = force_model.measurements.names.index(str(instance))
-    parts = force_model.parts.copy()
-    parts[:, k] *= p[0]
+    """Multiply the thrust of the thruster."""
+    measurements = force_model.measurements
+    k = measurements.names.index(str(instance))
+    parts, actuator = force_model.parts.copy(), measurements.profile.actuators[k]
+    if measurements.rudders is None or not actuator.rudder:
+        parts[:, k] *= p[0]
+        return replace(force_model, parts=parts)
+    thrust, helm = measurements.rudders[:, k].T
+    flow = 0.0 if measurements.current is None else current_in_body(measurements.current, measurements.psi)
+    nu = measurements.nu - flow
+    kept = 1.0 - actuator.inflow.get("thrust_deduction", 0.0)
+    ahead = force_at(actuator, (p[0] - 1.0) * kept * thrust, actuator.angle_rad)
+    steered = rudder_behind(actuator, helm, p[0] * thrust, nu) - rudder_behind(actuator, helm, thrust, nu)
+    parts[:, k] += actuator.count * (ahead + steered)
     return replace(force_model, parts=parts)
 
 

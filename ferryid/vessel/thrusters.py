@@ -241,17 +241,52 @@ def applied_force(
         delivered = force if "force" in signals else force * deduction
         part = force_at(actuator, delivered, angle)
         if "rudder" in signals:
-            part = part + rudder_force(
-                actuator.rudder,
-                signals["rudder"],
-                force,
-                nu,
-                diameter_m=actuator.inflow["diameter_m"],
-                wake_fraction=actuator.inflow.get("wake_fraction", 0.0),
-                water_density=actuator.inflow.get("water_density", FRESH_WATER),
-            )
+            part = part + rudder_behind(actuator, signals["rudder"], force, nu)
         tau += actuator.count * part
     return tau, (*notes, *more)
+
+
+def propellers_before_rudders(profile: Profile, columns: Mapping[str, Floats], nu: Floats) -> Floats | None:
+    """Return what the force of each rudder follows from besides the flow; None for a vessel without rudders.
+
+    Parameters
+    ----------
+    profile, columns, nu
+        As for `applied_force`.
+
+    Returns
+    -------
+    ndarray
+        Thrust of one propeller before deduction [N] and angle of its rudder [rad], NaN for actuators without one, shape
+        (n, k, 2).
+    """
+    if not any(actuator.rudder for actuator in profile.actuators):
+        return None
+    chosen, _ = actuator_columns(profile, columns)
+    found = np.full((len(nu), len(profile.actuators), 2), np.nan)
+    for k, actuator in enumerate(profile.actuators):
+        signals = {
+            role: np.asarray(columns[column], dtype=np.float64)
+            for (name, role), column in chosen.items()
+            if name == actuator.name
+        }
+        if "rudder" in signals:
+            found[:, k, 0] = _strength(profile, actuator, signals, nu)[0]
+            found[:, k, 1] = signals["rudder"]
+    return found
+
+
+def rudder_behind(actuator: Actuator, delta_rad: Floats, thrust_n: Floats, nu: Floats) -> Floats:
+    """Return the force of an actuator's rudder on the hull, of one unit; arguments and result of `rudder_force`."""
+    return rudder_force(
+        actuator.rudder,
+        delta_rad,
+        thrust_n,
+        nu,
+        diameter_m=actuator.inflow["diameter_m"],
+        wake_fraction=actuator.inflow.get("wake_fraction", 0.0),
+        water_density=actuator.inflow.get("water_density", FRESH_WATER),
+    )
 
 
 def _strength(profile: Profile, actuator: Actuator, signals: Mapping[str, Floats], nu: Floats) -> tuple[Floats, str]:

@@ -12,7 +12,7 @@ import numpy as np
 from ferryid.diagnose.data.simulated import artificial
 from ferryid.diagnose.data.thresholds import DATA
 from ferryid.effects.force_model import Measurements
-from ferryid.effects.measurements import actuator_forces, interpolate_gaps
+from ferryid.effects.measurements import actuator_forces, interpolate_gaps, rudder_states
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.signals.align import align
 from ferryid.signals.complementary_filter import MEAN_S, complementary_filter
@@ -249,4 +249,5 @@ def _measurements(track: Track, measured: Measured, profile: Profile, window_s: 
         wind=None if measured.wind is None else steady_mean(interpolate_gaps(measured.wind, usable), rows),
         current=None if current is None else steady_mean(current, rows),
         payload=None if measured.payload is None else interpolate_gaps(measured.payload, usable, held=True),
+        rudders=rudder_states(profile, track.columns, through_water, usable),
     )

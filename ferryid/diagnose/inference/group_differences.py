@@ -147,7 +147,9 @@ def _all_thrusters(campaign: Campaign) -> list[Candidate]:
 
 
 def _scaled(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
-    return replace(force_model, parts=force_model.parts * p[0])
+    for name in force_model.measurements.names:
+        force_model = effects()["thruster_gain"].apply(force_model, p, name)
+    return force_model
 
 
 def select_differences(

@@ -105,6 +105,11 @@ def stands_out(problem: EstimationProblem, linearisation: Linearisation, candida
     return _is_event(float(near.max(initial=-inf)), a, b, gain, i, j)
 
 
+def largest_gain(problem: EstimationProblem, linearisation: Linearisation, candidate: Candidate) -> float:
+    """Return the most evidence that a candidate promises in any span other than the whole log, beside a fit."""
+    return float(_scan(problem, linearisation, candidate)[3].max(initial=-inf))
+
+
 def _is_event(own: float, a: Ints, b: Ints, gain: Floats, i: int, j: int) -> bool:
     """Tell whether the evidence of a span from part i up to j is far above that of all that neither overlap nor touch it.
 

@@ -250,8 +250,8 @@ def _best_fit(
     # The impulse of an onset shows within seconds of it only; what is changed from then on leads there.
     smooth = replace(candidate, effect=replace(candidate.effect, impulse=None))
     # Seconds matter: which of them is best shows when each has its own.
-    least = max([hopeless, *(one.gain for one in throughout)])
-    spans = [scored_fit(one, least=least) for one in promising_spans(problem, linearisation, smooth)]
+    least, close = max([hopeless, *(one.gain for one in throughout)]), INFERENCE.close_span
+    spans = [scored_fit(one, least=close * least) for one in promising_spans(problem, linearisation, smooth)]
     index, step = len(current.candidates), 0.5 * part_s(problem, candidate)
 
     def refined(one: ScoredCandidate) -> ScoredCandidate:
@@ -259,9 +259,20 @@ def _best_fit(
         with_impulse = scored_fit(replace(coarse.candidates[-1], effect=candidate.effect), coarse.values[-1])
         return scored(refine_span(problem, with_impulse.fit, index, begin, min(step, FIRST_TIME_STEP_S)))
 
-    return max(
-        [*throughout, *(refined(one) for one in spans if one.gain > least)], key=lambda one: one.gain, default=None
-    )
+    def settled(one: ScoredCandidate) -> ScoredCandidate:
+        made = fit(problem, one.fit.candidates, one.fit.values, begin=starting_point(problem, one.fit))
+        return scored(made)
+
+    near = [one for one in spans if one.gain > least]
+    # An end that is off by a second may cost more than what all along gains more.
+    near = near or sorted((one for one in spans if one.gain > close * least), key=lambda one: -one.gain)[:1]
+    found = [refined(one) for one in near]
+    if throughout and found and max(one.gain for one in found) > hopeless:
+        # Few steps are judged by slopes where they began: of two that are close, one that goes far looks better than it is.
+        found = [max(found, key=lambda one: one.gain), *throughout]
+        found = [settled(one) for one in found]
+        return max(found, key=lambda one: one.gain)
+    return max([*throughout, *found], key=lambda one: one.gain, default=None)
 
 
 def _common_cause(problem: EstimationProblem, good: Sequence[ScoredCandidate]) -> ScoredCandidate:

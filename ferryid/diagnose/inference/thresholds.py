@@ -188,6 +188,12 @@ class InferenceThresholds:
         "evidence that an effect which only passes, such as a push, must have",
         "derived: evidence goes with the square of a force, and what is not twice as strong as all else like it is no event",
     )
+    close_span: float = threshold(
+        0.5,
+        "of the log evidence all along",
+        "log evidence of an effect's best span, its ends known to a part, from which they are sharpened",
+        "convention: half; an end that is off by a second leaves what changed then unexplained for as long",
+    )
     fitted_spans: int = threshold(
         3,
         "spans",

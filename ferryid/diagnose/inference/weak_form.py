@@ -279,6 +279,7 @@ def _thinned(measurements: Measurements, every: int) -> Measurements:
         wind=some(measurements.wind),
         current=some(measurements.current),
         payload=some(measurements.payload),
+        rudders=some(measurements.rudders),
     )
 
 

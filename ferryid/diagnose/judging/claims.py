@@ -53,6 +53,8 @@ class Figures:
         Evidence for a disturbance in the velocities alone [nat].
     other_logs
         What the other logs of a campaign say of a law; None where there are none.
+    sets_in
+        True where it sets in or ends within the log as an event that no hull explains, however far that is off.
     doubt
         Why its values are not credible, as the end of a sentence; empty where they are.
     """
@@ -69,6 +71,7 @@ class Figures:
     power_in_velocities: float = inf
     gain_in_velocities: float = inf
     other_logs: OtherLogs | None = None
+    sets_in: bool = False
     doubt: str = ""
 
 

@@ -252,8 +252,10 @@ def hull_from_this_log(finding: Finding, context: Context, _threshold: float) ->
     """Lower forces where the hull is known from nothing but the log that shows them.
 
     A hull that a campaign's other logs speak for is known as far as forces go; what a disturbance shakes is still guessed at,
-    and may be its measurement.
+    and may be its measurement. What sets in within the log is known by that: no hull changes from one moment to the next.
     """
+    if context.own.sets_in:
+        return finding, ""
     guessed = {"force": not context.log.joint, "disturbance": True}.get(context.own.kind, False)
     if context.log.hull_known or not guessed:
         return finding, ""
@@ -392,7 +394,7 @@ def log_notes(log: LogFigures) -> list[str]:
         notes.append(
             "The profile has no hull model: damping and added mass were fitted to this log beside the findings, which can "
             "stand in for what a hull model would explain. Take them as hints, of probability "
-            f"{JUDGING.hint_probability:g} at most."
+            f"{JUDGING.hint_probability:g} at most, but for what sets in within the log and stands out."
         )
     if drowned := drowned_axes(log, noise_drowns_an_axis.threshold or 0.0):
         shares = " and ".join(

@@ -31,6 +31,7 @@ from ferryid.diagnose.judging.figure_data import figure_columns, figure_regresso
 from ferryid.diagnose.judging.finding import Finding, Rival
 from ferryid.diagnose.judging.held_out import Proof
 from ferryid.diagnose.judging.locate import locate
+from ferryid.diagnose.judging.onset_evidence import sets_in
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.parallel import over
 from ferryid.effects.force_model import Measurements
@@ -47,7 +48,9 @@ TIME_STRAIGHT = 0.1
 SHOWN_RIVALS = 3
 
 
-def force_claims(problem: EstimationProblem, stands: Elimination, measurements: Measurements) -> list[Claim]:
+def force_claims(
+    problem: EstimationProblem, stands: Elimination, measurements: Measurements, *, hull_known: bool
+) -> list[Claim]:
     """Return the findings of forces with their figures, that which removes most of the error first.
 
     Parameters
@@ -58,17 +61,25 @@ def force_claims(problem: EstimationProblem, stands: Elimination, measurements: 
         What is left of the selection.
     measurements
         The log's measurements at its full rate.
+    hull_known
+        Whether the hull comes from elsewhere than this log.
     """
     removed = removed_shares(problem, stands)
     claims = [
-        _force_claim(problem, stands, measurements, i, removed.get(one.key, {}))
+        _force_claim(problem, stands, measurements, i, removed.get(one.key, {}), hull_known=hull_known)
         for i, one in enumerate(stands.fit.candidates)
     ]
     return sorted(claims, key=lambda one: -sum(one.finding.improvement.values()))
 
 
 def _force_claim(
-    problem: EstimationProblem, stands: Elimination, measurements: Measurements, i: int, removed: Mapping[str, float]
+    problem: EstimationProblem,
+    stands: Elimination,
+    measurements: Measurements,
+    i: int,
+    removed: Mapping[str, float],
+    *,
+    hull_known: bool,
 ) -> Claim:
     kept, standing = stands.fit, stands.standings[i]
     candidate, values = kept.candidates[i], kept.values[i]
@@ -111,7 +122,8 @@ def _force_claim(
             problem, place, figure_regressor(candidate, fitted_force_model(problem.plain, bare), values, place)
         ),
     )
-    return Claim(finding, _figures(problem, candidate, values, reported, proof, removed))
+    figures = _figures(problem, candidate, values, reported, proof, removed)
+    return Claim(finding, figures if hull_known else replace(figures, sets_in=sets_in(problem, kept, i)))
 
 
 def _mean_squares(proof: Proof) -> tuple[Mapping[str, float], Mapping[str, float]]:

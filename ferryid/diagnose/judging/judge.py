@@ -76,7 +76,7 @@ def _judged(
     progress("locating")
     claims = (
         *sensor_claims(log.estimated.averaged.screened),
-        *force_claims(problem, stands, measurements),
+        *force_claims(problem, stands, measurements, hull_known=log.estimated.baseline.hull_known),
         *disturbance_claims(problem, stands.fit, states, measurements),
         *unknown.claims,
     )

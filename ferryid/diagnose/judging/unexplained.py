@@ -19,6 +19,7 @@ from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fit, f
 from ferryid.diagnose.inference.folds import Folds, block_s, folds_of
 from ferryid.diagnose.inference.force_errors import force_errors, position_errors
 from ferryid.diagnose.inference.onset_estimation import is_brief
+from ferryid.diagnose.inference.search import refit_with_own_noise
 from ferryid.diagnose.inference.spectra import BURST_HZ, Band, Burst, bursts_of, shown_share
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.campaign_laws import CampaignLaws
@@ -26,7 +27,7 @@ from ferryid.diagnose.judging.claims import Claim, Figures, OtherLogs
 from ferryid.diagnose.judging.figure_data import figure_columns
 from ferryid.diagnose.judging.finding import UNKNOWN, Finding, LawTerm
 from ferryid.diagnose.judging.locate import Location, locate
-from ferryid.diagnose.judging.sparse_regression import Law, select_law
+from ferryid.diagnose.judging.sparse_regression import Law, says_the_same, select_law
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.parallel import over
 from ferryid.effects.force_model import ForceModel, Measurements
@@ -179,7 +180,25 @@ def _displaced(problem: EstimationProblem, kept: Fit, index: int, folds: Folds) 
     better = with_law - with_effect > max(
         INFERENCE.prior_odds, candidate.effect.formula_error * (with_law - with_neither)
     )
-    return better and with_both - with_law < INFERENCE.prior_odds
+    if not better or with_both - with_law >= INFERENCE.prior_odds:
+        return False
+    # A law knows no time: one that follows a step does so by terms that step too, as a record of thrust that was corrected.
+    return not candidate.times or not (
+        says_the_same(problem, without, law.terms, moved) or _explains_more_with_a_law(problem, kept, law.fit, folds)
+    )
+
+
+def _explains_more_with_a_law(problem: EstimationProblem, kept: Fit, law: Fit, folds: Folds) -> bool:
+    """Return whether a fit explains more, with a law of its own for what it leaves, than a law in the place of an effect.
+
+    A hull that is off leaves a law beside any effect. Terms for what the hull lacks are no evidence against the effect. What
+    sets in at a time is compared so; what acts all along is more easily taken for another law of the motion.
+    """
+    own = select_law(problem.with_noise_of(kept), kept, folds)
+    if own is None:
+        return False
+    ours, theirs = (refit_with_own_noise(problem, one) for one in (own.fit, law))
+    return ours.evidence > theirs.evidence
 
 
 def _lawful(law: Law, kept: Fit, measurements: Measurements, whose: str) -> Finding:

@@ -1,0 +1,66 @@
+"""What sets in within a log is known beside a hull that nobody knew; what acts all along, or hardly, is not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ferryid.diagnose.data.measurements import window_lengths
+from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, estimation_problem, fit
+from ferryid.diagnose.inference.prior import prior_force_model
+from ferryid.diagnose.inference.weak_form import windows
+from ferryid.diagnose.judging.onset_evidence import sets_in
+from ferryid.effects import effects
+from ferryid.effects.force_model import COEFFICIENTS
+from ferryid.effects.hull_spread import default_hull_spread
+from tests.diagnose.trials import FERRY, sailed
+
+SCENARIO = """
+schema = "ferryid.scenario/1"
+vessel = "milliampere"
+path = {{ kind = "twelve-corner" }}
+controller = {{ delta = 0.7, sigma = 0.7 }}
+sensors = {{ imu_rate_hz = 0.0, camera_rate_hz = 0.0 }}
+{fault}
+"""
+FAULT = '[thrusters]\nfaults = [{{ thruster = "thruster2", factor = {factor}, from_s = {onset} }}]\n'
+BEGAN_S = 400.0
+GAIN = Candidate.of(effects()["thruster_gain"], "thruster2", FERRY)
+
+
+def of_unknown_hull(folder: Path, factor: float, onset_s: float) -> EstimationProblem:
+    """Return a trial with a weak thruster, for one who knows no hull but its mass."""
+    seen = windows(
+        sailed(folder, f"weak-{factor}", SCENARIO.format(fault=FAULT.format(factor=factor, onset=onset_s)), 5),
+        *window_lengths(FERRY),
+    )
+    hull, rigid = FERRY.hull, np.zeros(len(COEFFICIENTS))
+    rigid[:5] = hull.mass_kg, hull.mass_kg, hull.mass_kg * hull.x_g_m, hull.mass_kg * hull.x_g_m, hull.inertia_z
+    plain = replace(prior_force_model(seen.measurements, FERRY)[0], hull=rigid)
+    return estimation_problem(seen, plain, default_hull_spread(FERRY, seen.measurements.nu))
+
+
+@pytest.mark.slow
+def test_a_loss_that_sets_in_is_known_beside_an_unknown_hull(tmp_path: Path) -> None:
+    case = of_unknown_hull(tmp_path, 0.6, BEGAN_S)
+    made = fit(case, [replace(GAIN, onset_s=BEGAN_S)])
+    assert made.values[0][0] == pytest.approx(0.6, abs=0.05)
+    assert sets_in(case, made, 0)
+    # At another time it is another loss, and what is left of this one asks for a span of its own.
+    late = fit(case, [replace(GAIN, onset_s=BEGAN_S + 150.0)])
+    assert not sets_in(case, late, 0)
+
+
+@pytest.mark.slow
+def test_a_loss_all_along_or_a_small_one_is_not(tmp_path: Path) -> None:
+    case = of_unknown_hull(tmp_path, 0.6, 0.0)
+    assert not sets_in(case, fit(case, [GAIN]), 0)
+    assert not sets_in(case, fit(case, [replace(GAIN, onset_s=60.0)]), 0)
+    # A weakness that lacks the last seconds is one all along.
+    last_s = float(case.steps.middle_s[-1])
+    assert not sets_in(case, fit(case, [replace(GAIN, offset_s=last_s - 20.0)]), 0)
+    small = of_unknown_hull(tmp_path, 0.97, BEGAN_S)
+    assert not sets_in(small, fit(small, [replace(GAIN, onset_s=BEGAN_S)]), 0)

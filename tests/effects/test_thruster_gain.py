@@ -1,0 +1,72 @@
+"""A weak propeller with a rudder behind it: the rudder feels the thrust that acts, as in the forces of the profile itself."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ferryid.effects import effects
+from ferryid.effects.force_model import ForceModel, Measurements, hull_of
+from ferryid.effects.measurements import actuator_forces, rudder_states
+from ferryid.types import Floats
+from ferryid.vessel import load_profile
+from ferryid.vessel.profile import Profile
+
+TANKER, FERRY = load_profile("kvlcc2-model"), load_profile("milliampere")
+N = 40
+
+
+def measured(profile: Profile, columns: dict[str, Floats], current: Floats | None = None) -> Measurements:
+    nu = np.column_stack([np.linspace(0.4, 1.2, N), np.linspace(-0.1, 0.1, N), np.linspace(-0.02, 0.02, N)])
+    every = np.ones(N, dtype=bool)
+    through_water = nu if current is None else nu - np.column_stack([current, np.zeros(N)])
+    parts, angles = actuator_forces(profile, columns, through_water, every)
+    return Measurements(
+        profile=profile,
+        t=0.2 * np.arange(N),
+        eta=np.zeros((N, 3)),
+        nu_raw=nu,
+        nu=nu,
+        parts=parts,
+        angles=angles,
+        usable=every,
+        current=current,
+        rudders=rudder_states(profile, columns, through_water, every),
+    )
+
+
+def weak(measurements: Measurements, factor: float, name: str) -> Floats:
+    plain = ForceModel(
+        measurements, hull_of(measurements.profile), measurements.parts, measurements.angles, np.zeros((N, 3))
+    )
+    return effects()["thruster_gain"].apply(plain, np.array([factor]), name).parts
+
+
+@pytest.mark.parametrize("factor", [0.0, 0.6, 1.0, 1.5])
+@pytest.mark.parametrize("current", [None, np.tile([0.2, -0.1], (N, 1))], ids=["still", "current"])
+def test_a_rudder_feels_the_thrust_that_acts(factor: float, current: Floats | None) -> None:
+    columns = {"F_propeller": np.linspace(5.0, 40.0, N), "delta_propeller": np.linspace(-0.5, 0.5, N)}
+    found = weak(measured(TANKER, columns, current), factor, "propeller")
+    lower = measured(TANKER, columns | {"F_propeller": factor * columns["F_propeller"]}, current)
+    np.testing.assert_allclose(found, lower.parts, rtol=1e-9, atol=1e-9)
+    if factor == 0.6:
+        # A rudder lives on the vessel's own flow too, so that it loses less than the propeller.
+        share = found[-1, 0, 1] / measured(TANKER, columns, current).parts[-1, 0, 1]
+        assert 0.6 < share < 0.95
+
+
+def test_without_a_rudder_the_force_is_multiplied() -> None:
+    columns = {
+        f"{what}_thruster{k}": np.full(N, 0.3 * k + 100.0 * (what == "F")) for what in ("F", "alpha") for k in (1, 2)
+    }
+    columns |= {f"n_thruster{k}": np.full(N, 300.0) for k in (1, 2)}
+    plain = measured(FERRY, columns)
+    assert plain.rudders is None
+    found = weak(plain, 0.7, "thruster2")
+    np.testing.assert_allclose(found[:, 1], 0.7 * plain.parts[:, 1])
+    np.testing.assert_array_equal(found[:, 0], plain.parts[:, 0])
+    # Measurements that lack the states of their rudders, as those of rows that nobody recorded, have the share alone.
+    bare = replace(measured(TANKER, {"F_propeller": np.full(N, 9.0), "delta_propeller": np.full(N, 0.1)}), rudders=None)
+    np.testing.assert_allclose(weak(bare, 0.7, "propeller"), 0.7 * bare.parts)
