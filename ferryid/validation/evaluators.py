@@ -10,7 +10,7 @@ from ferryid.validation.case_sampling import sample_cases
 from ferryid.validation.interfaces import Evaluator, Pipeline, Trial
 from ferryid.validation.log_generation import generate, realised_parameters
 from ferryid.validation.plant.effects import plant_effects
-from ferryid.validation.records import CaseResult, OracleResult, TransferResult
+from ferryid.validation.records import RIVALS, CaseResult, OracleResult, RivalDiagnoses, TransferResult
 from ferryid.vessel.profile import Profile
 
 RIVALS_EVERY = 5
@@ -25,6 +25,7 @@ def pipeline() -> Pipeline:
     evaluators = {
         "oracle": Evaluator(evaluate_oracle, OracleResult),
         "transfer": Evaluator(evaluate_transfer, TransferResult),
+        RIVALS: Evaluator(evaluate_rivals, RivalDiagnoses),
     }
     return Pipeline(sample_cases, generate, realised_parameters, evaluators, _score, _targets, _render)
 
@@ -45,17 +46,27 @@ def evaluate_oracle(trial: Trial) -> OracleResult | None:
 
 def evaluate_transfer(trial: Trial) -> TransferResult | None:
     """Return the scores of the diagnosed model, and in one case of `RIVALS_EVERY` of the rivals, on a transfer log."""
-    from ferryid.validation.rivals import RIVALS
+    from ferryid.validation import rivals as learners
     from ferryid.validation.transfer_test import transfer_test
     from ferryid.vessel import load_profile
 
-    rivals = RIVALS if int(trial.case.name) % RIVALS_EVERY == 0 else {}
+    rivals = learners.RIVALS if int(trial.case.name) % RIVALS_EVERY == 0 else {}
     if trial.model is None and not rivals:
         # Where nothing was found, nothing is claimed.
         return None
     other = generate(trial.case, trial.folder, transfer=True)
     profile, out = load_profile(trial.profile), trial.folder / "out"
     return transfer_test(str(trial.log), str(other.log), profile, out, diagnosed=trial.model, rivals=rivals)
+
+
+def evaluate_rivals(trial: Trial) -> RivalDiagnoses | None:
+    """Return what rivals name in one case of `RIVALS_EVERY`, as the diagnosis: of the log alone."""
+    from ferryid.validation.rivals.naming import diagnoses
+    from ferryid.vessel import load_profile
+
+    if int(trial.case.name) % RIVALS_EVERY:
+        return None
+    return diagnoses(str(trial.log), load_profile(trial.profile), trial.folder / "rivals")
 
 
 def _score(results: Sequence[CaseResult]) -> Any:

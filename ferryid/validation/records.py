@@ -12,6 +12,8 @@ from ferryid.validation.case import Case, Truth
 
 UNKNOWN = "unknown"
 """Effect id of a finding that has no name."""
+RIVALS = "rivals"
+"""Name of the evaluation in which rivals diagnose the same logs."""
 DIAGNOSED = "diagnosed"
 """Name of the diagnosed model among the methods of a transfer test."""
 Key = tuple[str, str | None]
@@ -168,6 +170,13 @@ class RivalName(Record):
 
 
 @dataclass(frozen=True)
+class RivalDiagnoses(Record):
+    """What every rival names in a log, by its name."""
+
+    methods: Mapping[str, Diagnosis]
+
+
+@dataclass(frozen=True)
 class StoredEffectNote(Record):
     """An effect of a diagnosed model that acts in the transfer log, with a sentence on it."""
 
@@ -259,6 +268,12 @@ class CaseResult:
         """What the oracle made of it."""
         found = self.evaluations.get("oracle")
         return found if isinstance(found, OracleResult) else None
+
+    @property
+    def rivals(self) -> RivalDiagnoses | None:
+        """What rivals name in it."""
+        found = self.evaluations.get(RIVALS)
+        return found if isinstance(found, RivalDiagnoses) else None
 
     @property
     def transfer(self) -> TransferResult | None:

@@ -26,6 +26,7 @@ from ferryid.validation.name_scores import (
 )
 from ferryid.validation.oracle_calibration import calibrated_thresholds
 from ferryid.validation.records import CaseResult, OracleEstimate
+from ferryid.validation.rival_scores import RivalScores, as_it_is, rival_scores
 from ferryid.validation.transfer_scores import Claim, Method, claims, failed_rivals, methods
 
 CLEAN = "clean"
@@ -111,6 +112,8 @@ class Scores(Record):
         Of the median diagnosis, and of the slowest.
     oracle_seconds
         The same of the oracle.
+    rivals
+        The diagnosis beside other methods, on the cases on which these were run.
     """
 
     runs: int
@@ -129,6 +132,7 @@ class Scores(Record):
     thresholds: Mapping[str, float]
     seconds: tuple[float, float]
     oracle_seconds: tuple[float, float]
+    rivals: tuple[RivalScores, ...] = ()
 
 
 def score(results: Sequence[CaseResult]) -> Scores:
@@ -155,6 +159,7 @@ def score(results: Sequence[CaseResult]) -> Scores:
         thresholds,
         _median_and_most([result.diagnosis.seconds for result in results]),
         _median_and_most([one.seconds for one in oracles]),
+        rival_scores(results, as_it_is),
     )
 
 

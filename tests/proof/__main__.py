@@ -22,6 +22,8 @@ from ferryid.validation.page_parts import command, few
 from ferryid.validation.recorded.doses import joined, pooled
 from ferryid.validation.recorded.page import page as page_of_recordings
 from ferryid.validation.recorded.scores import RecordedScores
+from ferryid.validation.records import DIAGNOSED
+from ferryid.validation.rival_scores import RivalScores
 from ferryid.validation.scores import Detection, Scores
 from ferryid.validation.source_hash import source_hash
 from tests.evidence import ROOT, stamp
@@ -62,6 +64,7 @@ def joint_page(simulated: Result | None, real: Result | None, hidden: Sequence[s
         SIDE_BY_SIDE,
         *_rows(halves),
         *(["", *hidden] if hidden else []),
+        *_rivals(halves),
     ]
     for one in halves:
         lines += ["", re.sub(r"^#", "##", one.text, flags=re.MULTILINE).strip()]
@@ -82,12 +85,15 @@ class Half:
         Its own page.
     cells
         Cells of the table of both, by effect.
+    rivals
+        The diagnosis beside other methods; none where these were not run.
     """
 
     name: str
     answers: Mapping[str, str]
     text: str
     cells: Mapping[str, tuple[str, ...]]
+    rivals: Sequence[RivalScores] = ()
 
     @classmethod
     def of_trials(cls, result: Result) -> Half:
@@ -109,7 +115,7 @@ class Half:
             one.cell: (f"{sum(one.blind_named)}/{len(one.blind_named)}", one.blind.text, few(_from_twice(one)))
             for one in scores.detections
         }
-        return cls("simulated", dict(zip(QUESTIONS, said, strict=True)), page(result, scores), cells)
+        return cls("simulated", dict(zip(QUESTIONS, said, strict=True)), page(result, scores), cells, scores.rivals)
 
     @classmethod
     def of_recordings(cls, result: Result) -> Half:
@@ -131,7 +137,7 @@ class Half:
             seen = few(doses[effect].at_twice) if effect in doses else ""
             cells[effect] = (few(Share(sum(flags), len(flags))), seen)
         text = page_of_recordings(result, scores)
-        return cls("real recordings", dict(zip(QUESTIONS, said, strict=True)), text, cells)
+        return cls("real recordings", dict(zip(QUESTIONS, said, strict=True)), text, cells, scores.rivals)
 
 
 QUESTIONS = (
@@ -157,6 +163,38 @@ are not made alike: in a trial it estimates the effect in the log itself, in a r
 
 | effect | simulated: named | 19 times in 20 from | twice the oracle's on | real: named | twice the oracle's | why they differ |
 |---|--:|--:|--:|--:|--:|---|"""
+
+
+RIVALS = """## Rivals on the same cases
+
+Other methods on the cases of both proofs, all given the log and the profile alone; on the simulated trials one case in five.
+Nothing but its own result makes a name of a method: no placebo and no held-out stretch lowers it. In a recording counts what a
+method names in the altered one and not in the recording as it was.
+
+- *thesis*: twelve components of 21 functions of the motion (Aurlien 2021). It has no regressor for an effect. Terms whose 95 %
+  interval excludes zero count as names: those of acceleration as a load, those of squares as fouling, others as the hull.
+- *weak SINDy*, *stepwise*: sparse regression on a library of terms, one or more for each nearly linear effect. The effect of a
+  term that is chosen is named. Neither has a term for gusts, waves and errors of the navigation other than a delay, an antenna
+  and a heading. A thruster counts, so that the right effect of the wrong thruster is wrong.
+- *output error*: each effect's parameters added to a fit of the hull to segments of 10 s by prediction error, and the effect
+  kept that lowers BIC most, up to four. Gusts, waves, pushes and what the checks of sensors find have no parameters in it.
+
+"Of those it can name" leaves out cases of effects without a regressor, which else count as missed.
+
+| cases | method | named right | of those it can name | named wrong | median error | s per case | refused |
+|---|---|--:|--:|--:|--:|--:|--:|"""
+
+
+def _rivals(halves: Sequence[Half]) -> list[str]:
+    """Return the section on rivals; nothing where none were run."""
+    rows = []
+    for half in halves:
+        for one in half.rivals:
+            name = "ferryid" if one.name == DIAGNOSED else one.name
+            error = "" if one.median_error is None else f"{100.0 * one.median_error:.0f} % of {one.parameters}"
+            cells = (one.right.text, one.able.text, one.wrong.text, error, f"{one.seconds:.0f}", str(one.refused))
+            rows.append(f"| {half.name} | {name} | {' | '.join(cells)} |")
+    return ["", RIVALS, *rows] if rows else []
 
 
 def _sources(result: Result) -> str:

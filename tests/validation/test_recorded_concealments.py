@@ -225,11 +225,13 @@ def test_the_librarys_effect_takes_back_what_an_actuator_claims(
     assert explained(log, again, effect, values, name) < left
 
 
-def test_a_propeller_behind_which_a_rudder_stands() -> None:
+def test_a_propeller_behind_which_a_rudder_stands(tmp_path: Path) -> None:
     log = tanker()
     after = altered(log, "thruster_gain", {"factor": 0.8}, "propeller")
     assert np.allclose(after.columns["F_propeller"], log.columns["F_propeller"] / 0.8)
     assert np.array_equal(after.columns["delta_propeller"], log.columns["delta_propeller"])
+    # The rudder feels what acts, in the record and in the library alike.
+    assert explained(log, reread(after, tmp_path), "thruster_gain", {"factor": 0.8}, "propeller") < 0.01
 
 
 def test_a_gain_from_a_time_on() -> None:

@@ -12,6 +12,7 @@ from ferryid.errors import FerryIdError
 from ferryid.validation.recorded.case_sampling import sample_recorded
 from ferryid.validation.recorded.effects import concealments
 from ferryid.validation.recorded.manifest import Recording, fingerprint, load_recordings
+from ferryid.vessel import load_profile
 from tests.validation.recorded_logs import BAG, tanker, zigzag
 
 HEAD = 'schema = "ferryid.recordings/1"\n'
@@ -95,17 +96,22 @@ def places(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 
 
 @pytest.mark.slow
-def test_what_cannot_be_used_is_a_line_and_the_others_go_on(places: dict[str, str]) -> None:
+def test_what_cannot_be_used_is_a_line_and_the_others_go_on(places: dict[str, str], tmp_path: Path) -> None:
+    unfed = tmp_path / "unfed.toml"
+    sections = re.split(r"^(?=\[)", load_profile("kvlcc2-model").text, flags=re.MULTILINE)
+    unfed.write_text("".join(one for one in sections if not re.match(r'\[signals\."propeller\.(thrust|speed)', one)))
     every = (
         Recording("long", (places["long"],), "kvlcc2-model"),
         Recording("short", (places["short"],), "kvlcc2-model"),
         Recording("other vessel", (places["long"],), "vtec-usv"),
         Recording("gone", (places["long"] + "x",), "kvlcc2-model"),
         Recording("pause", (places["pause"],), "kvlcc2-model"),
+        Recording("no feedback", (places["long"],), str(unfed)),
     )
     drawn = sample_recorded(every, 3, 0.2)
     why = {one.recording: one.why for one in drawn.not_made if not one.effect}
-    assert set(why) == {"short", "other vessel", "gone"}
+    assert set(why) == {"short", "other vessel", "gone", "no feedback"}
+    assert "neither feedback nor order" in why["no feedback"]
     assert "too short for a diagnosis, found 10 s with" in why["short"]
     assert "is needed by the profile vtec-usv" in why["other vessel"]
     assert all("Fix: " in line and "\n" not in line for line in why.values())
@@ -115,8 +121,12 @@ def test_what_cannot_be_used_is_a_line_and_the_others_go_on(places: dict[str, st
     assert (
         lacking["payload"] == "payload cannot be concealed in pause: its actuators cannot push freely in sway and yaw."
     )
-    with pytest.raises(FerryIdError, match=r"none of these effects can be concealed.*cannot push freely"):
-        sample_recorded(every[:1], 3, 0.2, ["payload"])
+    with pytest.raises(FerryIdError, match=r"none of these effects can be concealed") as refused:
+        sample_recorded(every[:2], 3, 0.2, ["payload", "current"])
+    # Every reason is told, and what the recording could carry instead.
+    assert "cannot push freely" in str(refused.value)
+    assert "no hull model" in str(refused.value)
+    assert re.search(r"Fix: conceal others, such as --only \w+,\w+,\w+$", str(refused.value))
     with pytest.raises(FerryIdError, match=r"no recording can be used\. The first: .*too short"):
         sample_recorded(every[1:2], 3, 0.2)
 

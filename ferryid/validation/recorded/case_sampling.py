@@ -45,6 +45,8 @@ TWICE = 2
 """Which of the sizes that is."""
 MOST_MISSED = 0.02
 """Share of the rewritten rows that may lack what expresses an effect."""
+MOST_REASONS = 4
+"""Reasons that an error tells."""
 LATER = (0.3, 0.6)
 """When an effect begins, as shares of the recording."""
 LARGE = (3.0, 8.0)
@@ -126,11 +128,24 @@ def sample_recorded(recordings: Sequence[Recording], seed: int, runs: float, onl
     if not cases:
         raise FerryIdError(f"--real: no recording can be used. The first: {lacking[0].why}")
     if not any(case.truths for case in cases):
-        raise FerryIdError(
-            f"--real: none of these effects can be concealed in the recordings. The first: {lacking[0].why} "
-            "Fix: leave out --only, or give other recordings"
-        )
+        raise _nothing_to_conceal(recordings, lacking)
     return Drawn(tuple(numbered(cases, seed)), tuple(lacking))
+
+
+def _nothing_to_conceal(recordings: Sequence[Recording], lacking: Sequence[NotMade]) -> FerryIdError:
+    """Return the error for a draw without an effect, with every reason once, and what the recordings could carry instead."""
+    whys = list(dict.fromkeys(one.why for one in lacking))
+    told = " ".join(whys[:MOST_REASONS]) + (
+        f" And {len(whys) - MOST_REASONS} more." if len(whys) > MOST_REASONS else ""
+    )
+    unusable = {one.recording for one in lacking if not one.effect}
+    able = [
+        one.id
+        for one in concealments().values()
+        if any(not any(map(one.cannot, logs_of(each))) for each in recordings if each.name not in unusable)
+    ]
+    fix = f"conceal others, such as --only {','.join(able[:3])}" if able else "give other recordings"
+    return FerryIdError(f"--real: none of these effects can be concealed. {told} Fix: {fix}")
 
 
 def logs_of(recording: Recording) -> list[RecordedLog]:

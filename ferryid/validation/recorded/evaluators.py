@@ -10,12 +10,12 @@ from typing import Any
 
 from ferryid.files import write_text
 from ferryid.validation.case import Case
-from ferryid.validation.interfaces import Pipeline
+from ferryid.validation.interfaces import Evaluator, Pipeline, Trial
 from ferryid.validation.log_generation import LogFiles
 from ferryid.validation.recorded.case_sampling import NotMade, concealed, logs_of, sample_recorded
 from ferryid.validation.recorded.manifest import Recording, fingerprint, load_recordings
 from ferryid.validation.recorded.writing import write_log
-from ferryid.validation.records import CaseResult
+from ferryid.validation.records import RIVALS, CaseResult, RivalDiagnoses
 
 FOLDER = "proof-real"
 """Name of the run's folder and of its page."""
@@ -41,7 +41,8 @@ def recorded_pipeline(real: str, vessel: str | None) -> Pipeline:
         proof.draw,
         partial(generate_recorded, recordings),
         nothing_realised,
-        {},
+        # Of one's own recording it is the diagnosis alone that is asked about.
+        {RIVALS: Evaluator(partial(evaluate_rivals, recordings), RivalDiagnoses)} if vessel is None else {},
         proof.score,
         _targets,
         _render,
@@ -83,6 +84,17 @@ def generate_recorded(recordings: Sequence[Recording], case: Case, folder: Path,
 def nothing_realised(case: Case) -> dict[str, dict[str, float]]:
     """Return nothing: all parameters of what is concealed are known beforehand."""
     return {}
+
+
+def evaluate_rivals(recordings: Sequence[Recording], trial: Trial) -> RivalDiagnoses | None:
+    """Return what rivals name in a log; nothing of a campaign, as they take one log."""
+    from ferryid.validation.rivals.naming import diagnoses
+    from ferryid.vessel import load_profile
+
+    recording = next(one for one in recordings if one.name == trial.case.path)
+    if len(recording.logs) > 1:
+        return None
+    return diagnoses(str(trial.log), load_profile(trial.profile), trial.folder / "rivals")
 
 
 @dataclass

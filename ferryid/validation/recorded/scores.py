@@ -18,6 +18,7 @@ from ferryid.validation.recorded.doses import Doses, joined
 from ferryid.validation.recorded.effects import Concealment, concealments
 from ferryid.validation.recorded.own_errors import OwnErrors
 from ferryid.validation.records import UNKNOWN, CaseResult, Key
+from ferryid.validation.rival_scores import Compare, RivalScores, rival_scores
 from ferryid.validation.targets import COVERED, FALSE, IN_TIME, Target, share_target
 
 AT_TWICE = 0.9
@@ -220,6 +221,8 @@ class RecordedScores(Record):
         Of two effects together.
     gross
         Of records that are wrong altogether; they enter `wrong` and none of the other shares.
+    rivals
+        The diagnosis beside other methods, on the cases on which these were run.
     """
 
     runs: int
@@ -238,6 +241,7 @@ class RecordedScores(Record):
     seconds: tuple[float, float]
     pairs: tuple[Paired, ...] = ()
     gross: tuple[Gross, ...] = ()
+    rivals: tuple[RivalScores, ...] = ()
 
 
 def score_recorded(
@@ -279,7 +283,22 @@ def score_recorded(
         (float(np.median(seconds)), max(seconds)) if seconds else (0.0, 0.0),
         tuple(_paired(one, plain[one.case.path]) for one in fresh if one.case.kind == "pair"),
         tuple(_gross(one) for one in broken),
+        rival_scores([one for one in results if one.case.kind != GROSS], _beside_plain, concealments()),
     )
+
+
+def _beside_plain(results: Sequence[CaseResult]) -> Compare:
+    """Return what leaves the findings of a case that the same method does not make of the recording as it was."""
+    plain = {one.case.path: one for one in results if one.case.kind == "clean"}
+
+    def compare(result: CaseResult) -> CaseResult:
+        as_it_was = plain[result.case.path]
+        new = difference(result, as_it_was)
+        known = set(names(as_it_was))
+        findings = tuple(one for one in new.diagnosis.findings if one.key not in known)
+        return replace(new, diagnosis=replace(new.diagnosis, findings=findings))
+
+    return compare
 
 
 def difference(result: CaseResult, plain: CaseResult, own: OwnErrors | None = None) -> CaseResult:
