@@ -111,7 +111,7 @@ def test_what_cannot_be_used_is_a_line_and_the_others_go_on(places: dict[str, st
     drawn = sample_recorded(every, 3, 0.2)
     why = {one.recording: one.why for one in drawn.not_made if not one.effect}
     assert set(why) == {"short", "other vessel", "gone", "no feedback"}
-    assert "neither feedback nor order" in why["no feedback"]
+    assert "has no thrust or speed signal" in why["no feedback"]
     assert "too short for a diagnosis, found 10 s with" in why["short"]
     assert "is needed by the profile vtec-usv" in why["other vessel"]
     assert all("Fix: " in line and "\n" not in line for line in why.values())

@@ -149,20 +149,6 @@ def _unlike(problem: EstimationProblem, kept: Fit, terms: Sequence[Term], moved:
     return [term for term, one in zip(terms, alike.tolist(), strict=True) if one < JUDGING.law_likeness]
 
 
-def says_the_same(problem: EstimationProblem, kept: Fit, terms: Sequence[Term], moved: Floats) -> bool:
-    """Return whether terms of a law together do to the gaps what an effect does, `moved` of shape (J, c), as one term may.
-
-    What the hull and the other effects can do is taken off both: it tells neither from the other.
-    """
-    lines = linearise_terms(problem, kept, terms)
-    known = lines.known.reshape(moved.size, -1)
-    both = np.column_stack([moved.reshape(-1), lines.terms.reshape(moved.size, -1)])
-    both -= known @ np.linalg.lstsq(known, both, rcond=1e-9)[0]
-    aim, pushes = both[:, 0], both[:, 1:]
-    follows = pushes @ np.linalg.lstsq(pushes, aim, rcond=1e-9)[0]
-    return float(np.linalg.norm(follows)) >= JUDGING.law_likeness * float(np.linalg.norm(aim))
-
-
 def law_candidate(problem: EstimationProblem, kept: Fit, terms: Sequence[Term]) -> Candidate:
     """Return a law as something that hypotheses can hold: one parameter a term.
 

@@ -27,7 +27,7 @@ from ferryid.diagnose.judging.claims import Claim, Figures, OtherLogs
 from ferryid.diagnose.judging.figure_data import figure_columns
 from ferryid.diagnose.judging.finding import UNKNOWN, Finding, LawTerm
 from ferryid.diagnose.judging.locate import Location, locate
-from ferryid.diagnose.judging.sparse_regression import Law, says_the_same, select_law
+from ferryid.diagnose.judging.sparse_regression import Law, select_law
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.parallel import over
 from ferryid.effects.force_model import ForceModel, Measurements
@@ -182,10 +182,7 @@ def _displaced(problem: EstimationProblem, kept: Fit, index: int, folds: Folds) 
     )
     if not better or with_both - with_law >= INFERENCE.prior_odds:
         return False
-    # A law knows no time: one that follows a step does so by terms that step too, as a record of thrust that was corrected.
-    return not candidate.times or not (
-        says_the_same(problem, without, law.terms, moved) or _explains_more_with_a_law(problem, kept, law.fit, folds)
-    )
+    return not (candidate.times and _explains_more_with_a_law(problem, kept, law.fit, folds))
 
 
 def _explains_more_with_a_law(problem: EstimationProblem, kept: Fit, law: Fit, folds: Folds) -> bool:
