@@ -177,7 +177,8 @@ method names in the altered one and not in the recording as it was.
   term that is chosen is named. Neither has a term for gusts, waves and errors of the navigation other than a delay, an antenna
   and a heading. A thruster counts, so that the right effect of the wrong thruster is wrong.
 - *output error*: each effect's parameters added to a fit of the hull to segments of 10 s by prediction error, and the effect
-  kept that lowers BIC most, up to four. Gusts, waves, pushes and what the checks of sensors find have no parameters in it.
+  kept that lowers BIC most, up to four. Gusts, waves, pushes, the hull's coefficients one by one and what the checks of
+  sensors find have no parameters in it.
 
 "Of those it can name" leaves out cases of effects without a regressor, which else count as missed.
 

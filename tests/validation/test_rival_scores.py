@@ -58,6 +58,8 @@ def test_rivals_and_diagnosis_are_scored_on_the_same_cases() -> None:
     assert own.median_error == pytest.approx(0.1)
     assert (stepwise.right, stepwise.able, stepwise.wrong) == (Share(0, 2), Share(0, 1), Share(1, 2))
     assert (stepwise.median_error, stepwise.parameters) == (None, 0)
+    assert "thruster_gain" in naming.NAMEABLE["output error"]
+    assert not {"gusts", "yaw_rate_scale", "external_push"} & set(naming.NAMEABLE["output error"])
     # It has no term for a thruster, nor for a gyro.
     assert (thesis.able, thesis.wrong, thesis.seconds) == (Share(0, 0), Share(1, 2), 4.0)
     assert rival_scores(results[2:], as_it_is) == ()

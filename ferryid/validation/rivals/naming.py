@@ -37,8 +37,9 @@ NAMEABLE: Mapping[str, tuple[str, ...]] = {
     "thesis": ("fouling", "hull_parameters", "payload"),
     "weak SINDy": (*LINEAR, "fouling", "hull_parameters", "mooring", "payload", "shallow_water", "wind"),
     "stepwise": (*LINEAR, "fouling", "hull_parameters", "mooring", "payload", "shallow_water", "wind"),
+    "output error": tuple(one.id for one in effects().values() if output_error.has_parameters(one)),
 }
-"""Effects that a method has a regressor for; output error has every effect of the library but those that come and go."""
+"""Effects that a method has a regressor or parameters for."""
 
 
 def diagnoses(log: str, profile: Profile, out: Path) -> RivalDiagnoses:

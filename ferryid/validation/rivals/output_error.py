@@ -210,11 +210,16 @@ def _cut(log: str, profile: Profile, out: Path) -> Segments:
     return one
 
 
+def has_parameters(effect: Effect) -> bool:
+    """Return whether an effect can be added to the fit: it neither comes and goes by chance nor chooses its parameters."""
+    return effect.unsteady is None and effect.choose is None and not effect.passing
+
+
 def _library(seen: Measurements) -> list[Tried]:
     found = []
     times = [float(one) for one in np.linspace(seen.t[0], seen.t[-1], ONSETS + 2)[1:-1]]
     for effect in effects().values():
-        if effect.unsteady is not None or effect.choose is not None or effect.passing or effect.untestable(seen):
+        if not has_parameters(effect) or effect.untestable(seen):
             continue
         for instance in effect.testable_instances(seen):
             every = [one for one in effect.parameters_of(seen.profile) if one.size > HELD]
