@@ -94,7 +94,7 @@ def run(loop: Loop, memory: Memory, measured: Measured, h: float, steps: int, ro
         _write_state(rows[first], t, state)
         if measured.sent[m] or m == 0:
             eta, nu = measure(loop.errors, measured.noise[m], _past(rows, first, loop.errors.delay_s / h))
-        before[:] = orders
+        _copy(orders, before)
         tau_d, ahead, goal = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (eta[0], eta[1], eta[2])
         if loop.open_loop:
             helm(loop.helm, memory.helm, t, eta, nu, orders)
@@ -135,7 +135,14 @@ def run(loop: Loop, memory: Memory, measured: Measured, h: float, steps: int, ro
             for i in range(k):
                 row[ROW + i], row[ROW + k + i] = memory.thrusters[i, 0], memory.thrusters[i, 1]
             state = advance(plant, index, h, state, memory.thrusters, acting, row[7:ROW])
-            acting[:] = orders
+            _copy(orders, acting)
+
+
+@compiled
+def _copy(orders: Floats, into: Floats) -> None:
+    # An assignment of slices would bring in, and compile, all that makes the text of its errors.
+    for i in range(len(orders)):
+        into[i, 0], into[i, 1] = orders[i, 0], orders[i, 1]
 
 
 @compiled
