@@ -9,8 +9,8 @@ DEMO ?= ferryid-out
 
 .PHONY: quick test docs evidence size demo picture bench attack faults real campaign rivals plans thesis proof proof-real wavy fixtures wheel-check lint clean
 
-# On two cores: a worker takes a slow test at a time and the rest by files, so that the fixtures of a file are made once.
-SPREAD = -n 2 --dist loadgroup --no-loadscope-reorder
+# On two cores: by files, so that the fixtures of a file are made once, in the order of tests/conftest.py.
+SPREAD = -n 2 --dist loadfile --no-loadscope-reorder
 
 # What most changes break, within a minute.
 quick: $(VENV)/installed

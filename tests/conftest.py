@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
+from functools import wraps
 from pathlib import Path
 from typing import Any
 
@@ -37,36 +38,72 @@ def nobody_waits_for_the_disk() -> Iterator[None]:
         yield
 
 
-def pytest_collection_modifyitems(items: list[Any]) -> None:
-    """Begin with the slow tests, one by one, and keep those together that share fixtures, or are quick, in a file.
+DRAWN = ("tests/report/", "tests/reproduce/", "tests/proof/", "tests/real/")
+NOT_DRAWN = "not drawn: see tests/conftest.py"
+BLANK = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"><title>{NOT_DRAWN}</title></svg>\n'
 
-    A worker that takes its last test early has nothing to do while the other one is at a slow test; a fixture of a file, and
-    what a function in it keeps (`functools.cache`), is made again by every worker that takes a test of it.
+
+@pytest.fixture(scope="session", autouse=True)
+def figures_are_drawn_where_they_are_looked_at(pytestconfig: pytest.Config) -> Iterator[None]:
+    """Put figures together in every test, but write them as SVG only where a test looks at them, or at a real recording.
+
+    Most commands write a page of ten to thirty figures, which takes most of the time of a fit of a short log.
     """
-    for item in items:
-        definitions = item._fixtureinfo.name2fixturedefs.values()
-        shares = any(one[-1].scope in ("module", "class") for one in definitions) or _keeps(item.module)
-        if shares or item.get_closest_marker("slow") is None:
-            item.add_marker(pytest.mark.xdist_group(item.nodeid.partition("::")[0]))
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    draw = FigureCanvasSVG.print_svg
+
+    # Its signature is looked at.
+    @wraps(draw)
+    def print_svg(canvas: Any, filename: Any, **options: Any) -> None:
+        if pytestconfig.stash[DRAWS]:
+            draw(canvas, filename, **options)
+        elif hasattr(filename, "write"):
+            filename.write(BLANK)
+        else:
+            Path(filename).write_text(BLANK, encoding="utf-8")
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(FigureCanvasSVG, "print_svg", print_svg)
+        yield
+
+
+DRAWS = pytest.StashKey[bool]()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: Any) -> None:
+    """Choose whether figures are drawn, before the fixtures of a file are made, which may write pages."""
+    item.config.stash[DRAWS] = _draws(item)
+
+
+def _draws(item: Any) -> bool:
+    """Tell whether a test needs figures as they are."""
+    return (
+        item.get_closest_marker("draws") is not None
+        or item.nodeid.startswith(DRAWN)
+        or "shared_data" in item.fixturenames
+    )
+
+
+def pytest_collection_modifyitems(items: list[Any]) -> None:
+    """Begin with the files that have slow tests; a worker that takes its last file early has little to wait for.
+
+    A file is the work of one worker (`--dist loadfile`): its fixtures, and what functions in it keep, are made once.
+    """
     slow = {item.nodeid.partition("::")[0] for item in items if item.get_closest_marker("slow")}
     # Stable: files stay in their order, but that the two that compile most come first: nobody waits for what a worker compiles.
-    items.sort(key=lambda item: (_compiles(item), item.nodeid.partition("::")[0] not in slow))
+    items.sort(key=lambda item: _place(item.nodeid.partition("::")[0], slow))
 
 
-def _compiles(item: Any) -> int:
-    """Return the place of a test among those that compile the simulators, which most others need; these come after them."""
-    path, _, name = item.nodeid.partition("::")
-    if path == "tests/simulate/test_reproducible.py":
-        return 0
-    return 1 if path == "tests/validation/test_case_sampling.py" and name.startswith("test_a_case_is_written") else 2
+def _place(path: str, slow: set[str]) -> int:
+    """Return the place of a file: those that compile the simulators first, which most others need."""
+    if path in COMPILE:
+        return COMPILE.index(path)
+    return len(COMPILE) + (path not in slow)
 
 
-def _keeps(module: Any) -> bool:
-    """Tell whether a file of tests has a function of its own whose results are kept."""
-    return any(
-        hasattr(one, "cache_clear") and getattr(one, "__module__", "") == module.__name__
-        for one in vars(module).values()
-    )
+COMPILE = ("tests/simulate/test_reproducible.py", "tests/validation/test_case_sampling.py")
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:

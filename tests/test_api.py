@@ -17,6 +17,8 @@ from ferryid.report import outcome as outcome_module
 from ferryid.report.outcome import Outcome
 from ferryid.vessel import load_profile
 
+pytestmark = pytest.mark.draws
+
 ROOT = Path(__file__).resolve().parents[1]
 SHORT = ROOT / "fixtures" / "short.mcap"
 

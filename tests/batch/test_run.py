@@ -411,7 +411,7 @@ mount -o remount,size=60m {tmp_path}/disk
 def test_on_a_cluster_that_loses_a_worker(tmp_path: Path, cluster: tuple[str, list[subprocess.Popen[bytes]]]) -> None:
     logs = archive(tmp_path, 8)
     (logs / "day3.mcap").write_bytes(b"")
-    recipe(tmp_path, FIT)
+    recipe(tmp_path)
     address, (_, *workers) = cluster
     told: list[str] = []
 

@@ -16,7 +16,7 @@ import ferryid.cli
 from ferryid.regression.bases.forms import basis_names
 from tests.report.pages import needs_nothing
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.draws]
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = sorted(

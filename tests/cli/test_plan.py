@@ -14,6 +14,8 @@ from tests.cli.test_diagnose_input import refused
 from tests.cli.test_every_command import conforms
 from tests.command_line.in_process import Run
 
+pytestmark = pytest.mark.draws
+
 Command = Callable[..., Run]
 
 

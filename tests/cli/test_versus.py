@@ -18,6 +18,8 @@ from tests.cli.test_diagnose_input import refused
 from tests.cli.test_every_command import conforms
 from tests.command_line.in_process import Run
 
+pytestmark = pytest.mark.draws
+
 VESSEL = ("--vessel", "milliampere")
 SCENARIO = """schema = "ferryid.scenario/1"
 vessel = "milliampere"

@@ -15,6 +15,8 @@ from ferryid.validation.scores import score
 from ferryid.validation.targets import share_target, targets
 from tests.validation.test_scores import WIND, curve_results, finding, result
 
+pytestmark = pytest.mark.draws
+
 RESULT: dict[str, Any] = {
     "seed": 5,
     "settings": {"runs": 4.0, "only": []},

@@ -29,6 +29,8 @@ from tests.cli.test_every_command import conforms
 from tests.validation.recorded_logs import BAG, zigzag
 from tests.validation.test_scores import finding
 
+pytestmark = pytest.mark.draws
+
 ferryid_run = ferryid_fixture
 
 LEAST_M = 0.3

@@ -11,7 +11,7 @@ from ferryid.validation.commitment import verified_answers
 from ferryid.validation.evaluators import pipeline
 from ferryid.validation.run import run_validation
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.draws]
 
 
 def test_a_gross_wind_in_five_minutes(tmp_path: Path) -> None:

@@ -34,7 +34,7 @@ from ferryid.vessel.hull import payload_mass
 from ferryid.vessel.wind import wind_force
 from tests.diagnose.judging.test_held_out import FERRY, sailed
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.draws]
 
 SPREAD = 0.3 * np.abs(hull_of(FERRY))
 NONE = np.zeros(len(INDUCED))
