@@ -8,15 +8,15 @@ from types import ModuleType
 from typing import Any
 
 import typer
-from typer.core import TyperGroup
 
 import ferryid
 from ferryid.cli.defaults import DefaultsCommand
+from ferryid.cli.plain_values import PlainGroup
 
 HELP = {"help_option_names": ["-h", "--help"]}
 
 
-class _Commands(TyperGroup):
+class _Commands(PlainGroup):
     """Every module ``cmd_<name>`` of this package: its function ``command``, or its group ``app``.
 
     Building a command takes longer than reading its module, so only the one that runs is built.

@@ -69,6 +69,9 @@ def command(
             help="Fit to what is kept of every log ingested to --out, or of those named; reads no log.",
         ),
     ] = False,
+    report: Annotated[
+        bool, typer.Option("--report/--no-report", help="Write the page, or store the model alone, which is faster.")
+    ] = True,
     verify: Verify = False,
     out: Out = OUT,
     json: Json = None,
@@ -91,6 +94,7 @@ def command(
         name=name,
         archive=archive,
         command=("ferryid", *sys.argv[1:]),
+        report=report,
         verify=verify,
         ranges=ranges(from_, to),
         progress=progress,

@@ -12,11 +12,13 @@ from ferryid import interrupts
 from ferryid.cli.completion import vessel_names
 from ferryid.cli.options import From, Json, To, ranges
 from ferryid.cli.output import emit, progress, tell
+from ferryid.cli.plain_values import PlainCommand, PlainGroup
 
 if TYPE_CHECKING:
     from ferryid.draft import Question
 
 app = typer.Typer(
+    cls=PlainGroup,
     help="Draft, check, show and list vessel profiles.",
     no_args_is_help=True,
     rich_markup_mode=None,
@@ -30,7 +32,7 @@ File = Annotated[
 ]
 
 
-@app.command()
+@app.command(cls=PlainCommand)
 def new(
     log: Annotated[str, typer.Argument(help="A bag, MCAP file, table or folder; parts of one log joined by +.")],
     like: Annotated[
@@ -87,7 +89,7 @@ def _asked(question: Question) -> str:
         tell(f"{answer!r} is no answer here")
 
 
-@app.command()
+@app.command(cls=PlainCommand)
 def check(
     file: File,
     identifiable: Annotated[
@@ -110,7 +112,7 @@ def check(
         raise typer.Exit(2)
 
 
-@app.command()
+@app.command(cls=PlainCommand)
 def show(
     file: File,
     toml: Annotated[
@@ -124,7 +126,7 @@ def show(
     typer.echo(profile.text if toml else describe(profile), nl=not toml)
 
 
-@app.command("list")
+@app.command("list", cls=PlainCommand)
 def list_(json: Json = None) -> None:
     """List the profiles that have a name.
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from typer.core import TyperCommand
 
+from ferryid.cli.plain_values import PlainValues
 from ferryid.errors import did_you_mean
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ _OTHER_MEANING = {"export": ("to",), "models": ("to",)}
 """Options that mean something else in a command than in the others: what a file has for all is not theirs."""
 
 
-class DefaultsCommand(TyperCommand):
+class DefaultsCommand(PlainValues, TyperCommand):
     """A command whose options take their defaults from the nearest ``ferryid.toml``."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:

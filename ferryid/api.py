@@ -242,6 +242,7 @@ def fit(
     name: str = "",
     archive: bool = False,
     command: Sequence[str] = (),
+    report: bool = True,
     verify: bool = False,
     progress: Progress = _quiet,
     ranges: Ranges = (),
@@ -266,6 +267,8 @@ def fit(
         Fit to the sums kept of ingested logs; no log is read.
     command
         The words that the page says it was asked for with.
+    report
+        Write the page; without it the model alone is stored, in a third of the time.
     verify
         Read whole files and check every checksum.
     announce
@@ -278,10 +281,17 @@ def fit(
     settings, run, paths = settings or FitSettings(), _context(out, progress, verify, ranges, command), _paths(logs)
     if archive:
         _refuse_ranges_of_archive(ranges)
-        return fit_archive_and_report(_of_archive(run.out, vessel, announce), settings, run, paths, name=name)
+        return fit_archive_and_report(
+            _of_archive(run.out, vessel, announce), settings, run, paths, name=name, page=report
+        )
     profile = _chosen(paths, vessel, announce)
     return shown_where_refused(
-        lambda: fit_and_report(paths, profile, settings, run, name=name), "fitted", paths, profile, run, command
+        lambda: fit_and_report(paths, profile, settings, run, name=name, page=report),
+        "fitted",
+        paths,
+        profile,
+        run,
+        command,
     )
 
 

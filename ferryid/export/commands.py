@@ -9,7 +9,6 @@ from typing import Any
 from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError
 from ferryid.export.formats import formats
-from ferryid.export.log_file import export_log
 from ferryid.export.model_file import export_model
 from ferryid.export.sdf import SMALL, shares
 from ferryid.files import check_result
@@ -91,6 +90,8 @@ def export(
     choice = choose_vessel([what], vessel, own=own)
     if choice.reason:
         announce(choice.reason)
+    from ferryid.export.log_file import export_log  # brings the simulator and the diagnosis
+
     return export_log(
         what,
         mcap,

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 from ferryid.export.cases import USUAL
 from ferryid.export.exported import Exported
@@ -151,6 +150,8 @@ def mass_share(one: Exported, mass: Floats) -> dict[str, float]:
 
 def _fitted(kept: PlanarTerms, slots: Slots, nu: Floats, rest: Floats) -> PlanarTerms:
     """Return terms with those of ``slots.fitted`` changed so that they take up the rest, shape (s, 3)."""
+    from scipy.optimize import lsq_linear  # a tenth of a second to import
+
     made = PlanarTerms(kept.linear.copy(), kept.absolute.copy(), kept.product.copy())
     for axis in range(3):
         mine = [slot for slot in slots.fitted if slot[0] == axis]

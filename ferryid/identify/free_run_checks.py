@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import stdtrit
 
 from ferryid.counts import counted
 from ferryid.identify.acceptance import Check
@@ -118,5 +117,7 @@ def paired_interval(difference: Floats, clusters: Ints) -> tuple[float, float, f
     sums = np.bincount(which, weights=difference - mean)
     count = len(sums)
     error = float(np.sqrt(count / (count - 1) * np.sum(sums**2)) / len(difference))
+    from scipy.special import stdtrit  # a tenth of a second to import: only where it is needed
+
     reach = float(stdtrit(count - 1, 0.5 + IDENTIFY.free_run_level / 2)) * error
     return mean, mean - reach, mean + reach

@@ -27,6 +27,7 @@ from ferryid.ingest.layout import (
     tree,
 )
 from ferryid.ingest.log import Column, Loss, Series
+from ferryid.ingest.rosbags_reading import generate_reading
 from ferryid.types import Nanoseconds
 
 __all__ = ["Decoder", "decoder_for", "leaf_fields"]
@@ -99,7 +100,7 @@ def decoder_for(
             "Fix: record again with definitions, or map another topic"
         )
     try:
-        typestore.get_msgdef(msgtype)
+        generate_reading(typestore, msgtype, "deserialize_cdr_le" if encoding == "cdr" else "deserialize_ros1")
     except PARSER_ERRORS as error:
         raise FerryIdError(
             f"{said}: the messages cannot be decoded, found an incomplete definition of {msgtype} "

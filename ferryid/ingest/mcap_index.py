@@ -20,10 +20,10 @@ from mcap.exceptions import McapError
 from mcap.records import Channel, Schema, Statistics
 from numpy.typing import NDArray
 
+from ferryid.ingest.formats.mcap import MAGIC
 from ferryid.ingest.log import Loss
 from ferryid.types import Nanoseconds
 
-MAGIC = b"\x89MCAP0\r\n"
 # Opcodes of the specification.
 HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX = 1, 2, 3, 4, 5, 6, 7, 8
 ATTACHMENT, ATTACHMENT_INDEX, STATISTICS, METADATA, METADATA_INDEX, SUMMARY_OFFSET, DATA_END = range(9, 16)

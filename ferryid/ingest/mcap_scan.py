@@ -15,6 +15,7 @@ import numpy as np
 from mcap.records import Channel
 
 from ferryid.counts import counted, verb
+from ferryid.ingest.formats.mcap import MAGIC
 from ferryid.ingest.log import Loss
 from ferryid.ingest.mcap_index import (
     ATTACHMENT,
@@ -23,7 +24,6 @@ from ferryid.ingest.mcap_index import (
     DATA_END,
     HEADER,
     LAST_OPCODE,
-    MAGIC,
     MESSAGE,
     MESSAGE_HEADER,
     MESSAGE_INDEX,

@@ -9,6 +9,7 @@ from itertools import pairwise
 from mcap.records import Statistics
 
 from ferryid.ingest.checksum import crc32
+from ferryid.ingest.formats.mcap import MAGIC
 from ferryid.ingest.mcap_index import (
     ATTACHMENT,
     CHANNEL,
@@ -18,7 +19,6 @@ from ferryid.ingest.mcap_index import (
     FOOTER_SIZE,
     HEADER,
     LATEST_NS,
-    MAGIC,
     METADATA,
     PRIVATE,
     RECORD_HEADER,

@@ -16,7 +16,6 @@ from ferryid.ingest.bulk import Decoder, decoder_for, leaf_fields
 from ferryid.ingest.definitions import DefinitionError, parse_definition, typestore_of
 from ferryid.ingest.json_messages import JsonDecoder, sample_fields, schema_fields
 from ferryid.ingest.layout import EMPTY_MEMBER
-from ferryid.ingest.protobuf import ProtobufDecoder, protobuf_fields
 from ferryid.ingest.ros2_types import Definition, define
 
 MESSAGE_ENCODINGS = ("ros1", "cdr", "protobuf", "json")
@@ -121,10 +120,17 @@ def fields_of(channel: Channel, schema: Schema | None, first: Callable[[], bytes
     name, definition = type_name(channel, schema), b"" if schema is None else schema.data
     encoding = channel.message_encoding
     if encoding == "protobuf":
-        return LazyFields(lambda: protobuf_fields(definition, name))
+        return LazyFields(lambda: _protobuf_fields(definition, name))
     if encoding == "json":
         return LazyFields(lambda: schema_fields(definition) or sample_fields(first()))
     return LazyFields(lambda: _ros_definition(channel, schema).fields)
+
+
+def _protobuf_fields(definition: bytes, name: str) -> Mapping[str, str]:
+    # The package of protobuf takes a tenth of a second to load.
+    from ferryid.ingest.protobuf import protobuf_fields
+
+    return protobuf_fields(definition, name)
 
 
 def _ros_definition(channel: Channel, schema: Schema | None) -> Definition:
@@ -168,6 +174,8 @@ def decoder_of(
     name, encoding = type_name(channel, schema), channel.message_encoding
     definition = b"" if schema is None else schema.data
     if encoding == "protobuf":
+        from ferryid.ingest.protobuf import ProtobufDecoder
+
         return ProtobufDecoder(definition, name, channel.topic, paths, said), ""
     if encoding == "json":
         return JsonDecoder(channel.topic, paths, said), ""

@@ -114,7 +114,7 @@ class RecordReader:
         since_ns: int,
         note: str,
     ) -> None:
-        self.paths = (path,)
+        self.paths: tuple[Path, ...] = (path,)
         self._tables = {table.name: table for table in tables}
         self._since_ns = since_ns
         self.losses = tuple(losses)

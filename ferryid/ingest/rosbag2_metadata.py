@@ -18,11 +18,10 @@ from ruamel.yaml.events import (
     SequenceStartEvent,
 )
 
+from ferryid.ingest.formats.rosbag2 import KEY
 from ferryid.ingest.log import Topic
 from ferryid.ingest.ros2_types import normalized
 
-NAME = "metadata.yaml"
-KEY = "rosbag2_bagfile_information"
 # Start time of a recording without messages, and anything else that no clock has shown.
 NO_TIME = 2**62
 # A recording of a thousand topics or files takes less than this; parsing takes seconds for every megabyte.

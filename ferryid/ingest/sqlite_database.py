@@ -14,11 +14,11 @@ import numpy as np
 
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError
+from ferryid.ingest.formats.sqlite3_bag import MAGIC
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
 
-MAGIC = b"SQLite format 3\0"
 # What the sqlite3 module raises for a damaged file: a message of SQLite may quote bytes that are no UTF-8, and a
 # damaged length may ask for more memory than there is.
 FAULTS = (sqlite3.Error, MemoryError, UnicodeDecodeError)

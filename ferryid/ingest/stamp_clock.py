@@ -185,10 +185,19 @@ def _blocks(stamp: Nanoseconds, latency: Nanoseconds) -> tuple[NDArray[np.float6
     for number, (start, end) in enumerate(pairwise(edges)):
         stride = max(1, int(end - start) // _BLOCK_SAMPLES)
         values = (latency[start:end:stride] - base).astype(np.float64)
-        middles[number] = np.median(values)
-        spreads[number] = np.median(np.abs(values - middles[number]))
+        middles[number] = _middle(values)
+        spreads[number] = _middle(np.abs(values - middles[number]))
         places[number] = float(stamp[(start + end) // 2] - stamp[0])
     return places, middles, 1.4826 * float(np.median(spreads))
+
+
+def _middle(values: NDArray[np.float64]) -> float:
+    """Median of finite values; `numpy.median` takes ten times as long for a few hundred."""
+    half = len(values) // 2
+    if len(values) % 2:
+        return float(np.partition(values, half)[half])
+    low, high = np.partition(values, (half - 1, half))[half - 1 : half + 1].tolist()
+    return float(low + high) / 2.0
 
 
 def _theil_sen(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:

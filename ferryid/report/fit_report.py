@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,13 +13,10 @@ from ferryid.files import alone
 from ferryid.identify import FitOutcome, FitSettings, fit_archive, fit_logs
 from ferryid.models import model_to_json
 from ferryid.models.store import StoredModel, assign_version, plan, save
-from ferryid.report.fit_timeline import fit_timeline
 from ferryid.report.folder import PAGE, made, write_folder
-from ferryid.report.interactive import make_interactive
+from ferryid.report.headline import headline_of
 from ferryid.report.model_text import describe_settings
 from ferryid.report.outcome import Report
-from ferryid.report.page import MAX_LOGS, headline, render
-from ferryid.report.tables import tables_of
 from ferryid.types import AXES, RunContext
 from ferryid.vessel.profile import Profile
 
@@ -29,7 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False)
 class FitReport(Report):
-    """What a fit leaves: its report, and the stored model."""
+    """What a fit leaves: its report, unless none was wanted, and the stored model."""
 
     stored: StoredModel
 
@@ -41,6 +38,8 @@ class FitReport(Report):
     @property
     def tables(self) -> dict[str, pd.DataFrame]:
         """Those of the result, and the ``coefficients`` of the model with their intervals."""
+        from ferryid.report.tables import tables_of
+
         return {**tables_of(model_to_json(self.stored.model)), **super().tables}
 
 
@@ -51,6 +50,7 @@ def fit_and_report(
     run: RunContext,
     *,
     name: str = "",
+    page: bool = True,
 ) -> FitReport:
     """Fit a model to logs, store it in the output folder, and write its report.
 
@@ -66,13 +66,15 @@ def fit_and_report(
         Output folder, in which ``logs``, ``models`` and ``reports`` are made; progress; whether to check every checksum.
     name
         Name of the model; the profile's where empty.
+    page
+        Whether a report is written; without it, the model alone is.
 
     Raises
     ------
     FerryIdError
         For unusable input or an output folder that cannot be written; nothing half-written is left.
     """
-    return _reported(fit_logs(logs, profile, settings, run, name=name), run)
+    return _reported(fit_logs(logs, profile, settings, run, name=name), run, page)
 
 
 def fit_archive_and_report(
@@ -82,29 +84,42 @@ def fit_archive_and_report(
     logs: Sequence[str] = (),
     *,
     name: str = "",
+    page: bool = True,
 ) -> FitReport:
     """Fit a model to the block sums of the logs in the output folder, else as `fit_and_report`."""
-    return _reported(fit_archive(profile, settings, run, logs, name=name), run)
+    return _reported(fit_archive(profile, settings, run, logs, name=name), run, page)
 
 
-def _reported(result: FitOutcome, run: RunContext) -> FitReport:
-    run.progress("writing the report")
+def _reported(result: FitOutcome, run: RunContext, page: bool) -> FitReport:
+    run.progress("writing the report" if page else "storing the model")
     out = run.out
     with alone(out / "models"):
         result = replace(result, model=assign_version(result.model, out))
-        folder = out / "reports" / f"{result.model.name}-v{result.model.version}"
-        timelines = {k: fit_timeline(log) for k, log in enumerate(result.logs[:MAX_LOGS])}
-        interactive = make_interactive(timelines, folder, run.tables_out or out)
-        page, drawings = render(result, interactive, made(run.command))
+        report = out / "reports" / f"{result.model.name}-v{result.model.version}" / PAGE
         stored = plan(result.model, out)
-        plain = as_json(result, stored, folder / PAGE)
-        write_folder(folder, page, drawings, plain, "fit.json", lambda: save(result.model, out), interactive.files())
+        plain = as_json(result, stored, report if page else None)
+        if page:
+            _write_page(result, report.parent, plain, run)
+        else:
+            save(result.model, out)
     run.progress("")
-    report = folder / PAGE
-    return FitReport(plain, as_text(result, stored, report), report, stored)
+    return FitReport(plain, as_text(result, stored, report if page else None), report, stored)
 
 
-def as_json(result: FitOutcome, stored: StoredModel, report: Path) -> dict[str, Any]:
+def _write_page(result: FitOutcome, folder: Path, plain: Mapping[str, Any], run: RunContext) -> None:
+    """Write the report of a fit, and store its model."""
+    # What draws takes half a second to import.
+    from ferryid.report.fit_timeline import fit_timeline
+    from ferryid.report.interactive import make_interactive
+    from ferryid.report.page import MAX_LOGS, render
+
+    timelines = {k: fit_timeline(log) for k, log in enumerate(result.logs[:MAX_LOGS])}
+    interactive = make_interactive(timelines, folder, run.tables_out or run.out)
+    text, drawings = render(result, interactive, made(run.command))
+    write_folder(folder, text, drawings, plain, "fit.json", lambda: save(result.model, run.out), interactive.files())
+
+
+def as_json(result: FitOutcome, stored: StoredModel, report: Path | None) -> dict[str, Any]:
     """Return the result of a fit in the form of schema ``ferryid.fit/1``."""
     model = result.model
     return {
@@ -116,7 +131,7 @@ def as_json(result: FitOutcome, stored: StoredModel, report: Path) -> dict[str, 
             "current": stored.current,
             "accepted": model.accepted,
         },
-        "headline": headline(result),
+        "headline": headline_of(result),
         "reasons": list(result.acceptance.reasons),
         "acceptance": result.acceptance.to_json(),
         "warnings": list(result.warnings),
@@ -141,15 +156,15 @@ def as_json(result: FitOutcome, stored: StoredModel, report: Path) -> dict[str, 
         **({"archive": [log.to_json() for log in result.archive]} if result.archive else {}),
         **({"estimators": [one.to_json() for one in result.estimators]} if result.estimators else {}),
         **({"conditions": [one.to_json() for one in result.winds]} if result.winds else {}),
-        "report": str(report),
+        "report": None if report is None else str(report),
     }
 
 
-def as_text(result: FitOutcome, stored: StoredModel, report: Path) -> str:
+def as_text(result: FitOutcome, stored: StoredModel, report: Path | None) -> str:
     """Return the verdict for a terminal."""
     model, scores = result.model, result.scores.force
     lines = [
-        headline(result),
+        headline_of(result),
         *(f"  {reason}" for reason in result.acceptance.reasons),
         "",
         f"fitted with {describe_settings(model)}",
@@ -174,7 +189,8 @@ def as_text(result: FitOutcome, stored: StoredModel, report: Path) -> str:
     if stored.current and stored.previous not in (None, model.version):
         state += f"; before it was @{stored.previous}, compare them on a log that neither was trained on"
     lines.append(f"model   {stored.path} ({model.name}@{model.version}, {state})")
-    lines.append(f"report  {report}")
+    if report is not None:
+        lines.append(f"report  {report}")
     return "\n".join(lines)
 
 

@@ -49,7 +49,7 @@ class Outcome:
 
 @dataclass(frozen=True, repr=False)
 class Report(Outcome):
-    """A result with a page, which a notebook shows in its place."""
+    """A result with a page, which a notebook shows in its place where it was written: `report` is its path."""
 
     report: Path
 
@@ -59,6 +59,8 @@ class Report(Outcome):
         return {path.stem: path for path in sorted(self.report.parent.glob("*.svg"))}
 
     def _repr_html_(self) -> str:
+        if not self.report.is_file():
+            return super()._repr_html_()
         if self.report.stat().st_size > LARGEST_SHOWN:
             return f"{super()._repr_html_()}<p><a href='{escape(self.report.resolve().as_uri())}'>report</a></p>"
         page = escape(self.report.read_text(encoding="utf-8"))

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.counts import counted, verb
+from ferryid.counts import counted
 from ferryid.identify import FitOutcome, LogFit
 from ferryid.models import RANGE_UNITS, ForceScores
 from ferryid.models.forces import effective_mass
 from ferryid.report import figures
+from ferryid.report.headline import headline_of
 from ferryid.report.html import template
 from ferryid.report.interactive import STATIC, Interactive
 from ferryid.report.left_out import left_out_table
@@ -48,27 +49,6 @@ def _drawings(part: Any) -> Iterator[tuple[str, str]]:
             yield from _drawings(value)
 
 
-def headline(result: FitOutcome) -> str:
-    """Return the verdict in one sentence."""
-    change = result.acceptance.normalised_mse - 1.0
-    hull = parse_profile(result.model.profile_text, result.model.name).hull
-    base = "the base model's" if hull.has_model else "that of the base model, which is rigid-body mass alone,"
-    if not np.isfinite(change):
-        told = f"its {result.scores.measure} error could not be compared with the base model's"
-    else:
-        word = "below" if change < 0 else "above"
-        told = f"mean square {result.scores.measure} error {abs(change):.1%} {word} {base} on data it did not see"
-    count = len(result.warnings)
-    trust = (
-        f" Read the {counted(count, 'warning')} first." if count > 1 else " Read the warning first." if count else ""
-    )
-    if result.acceptance.accepted:
-        return f"Accepted: {told}.{trust}"
-    failed = [check for check in result.acceptance.checks if check.passed is False]
-    why = f", but {counted(len(failed), 'condition')} {verb(len(failed), 'fails')}" if failed and change < 0 else ""
-    return f"Not accepted: {told}{why}."
-
-
 _HOLDS = {True: "yes", False: "no", None: "not known"}
 
 
@@ -82,7 +62,7 @@ def _context(result: FitOutcome, interactive: Interactive) -> dict[str, Any]:
         "version": model.version,
         "accepted": verdict.accepted,
         "verdict_word": "accepted" if verdict.accepted else "not accepted",
-        "headline": headline(result),
+        "headline": headline_of(result),
         "reasons": verdict.reasons,
         "estimators": [
             {

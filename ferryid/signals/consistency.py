@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from ferryid.signals.mirror import mirrored
 from ferryid.signals.quality import IMPLAUSIBLE
@@ -118,6 +117,8 @@ def _range(seen: _Changes) -> tuple[float, float]:
         sums = np.bincount(block, x * (y - slope * x))
         count = sums.size
         error = float(np.sqrt(np.sum(sums**2) * count / max(count - 1, 1))) / float(x @ x)
+        from scipy.special import stdtrit  # a tenth of a second to import: only where it is needed
+
         half = float(stdtrit(max(count - 1, 1), SIGNALS.gain_quantile)) * error
         ends.append((slope - half, slope + half))
     (low, high), (least, most) = ends

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ferryid.recursive_filter import recursive_filter
 from ferryid.types import Flags, Floats
 
 WINDOW_PER_TIME = 8.0 * np.sqrt(2.0) / 3.0
@@ -162,6 +161,8 @@ def smooth_run(values: Floats, time_rows: float) -> Floats:
 
 def _prediction_variance(columns: Sequence[Floats], time_rows: float) -> float:
     """Return the mean square of the steady-state filter's one-step prediction errors."""
+    from ferryid.recursive_filter import recursive_filter  # brings numba
+
     polynomial, _ = steady_state(time_rows)
     total, count = 0.0, 0
     for column in columns:

@@ -8,13 +8,11 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from ferryid import __version__
 from ferryid.files import replacing
 from ferryid.simulate.output_paths import check_output
-from ferryid.simulate.recorders import write_mcap, write_ros1, write_ros2
+from ferryid.simulate.recorders import write_mcap
 from ferryid.simulate.trial import Simulation
 
 CHUNK_BYTES = 768 * 1024
@@ -60,8 +58,12 @@ def write_log(
         if suffix == ".mcap":
             write_mcap(streams, temporary, chunk_bytes)
         elif suffix == ".bag":
+            from ferryid.simulate.rosbag_recorders import write_ros1
+
             write_ros1(streams, temporary, chunk_bytes)
         else:
+            from ferryid.simulate.rosbag_recorders import write_ros2
+
             with _inside(temporary, out.name) as folder:
                 write_ros2(streams, folder, storage)
         if truth is not None:
@@ -82,6 +84,9 @@ def _inside(temporary: Path, name: str) -> Iterator[Path]:
 
 def _write_truth(simulation: Simulation, path: Path) -> None:
     """Write the true states as one Parquet table, the scenario in its metadata."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     truth = simulation.truth
     columns = {"t": truth.t}
     for names, values in (

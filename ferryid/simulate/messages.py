@@ -7,6 +7,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
@@ -56,41 +57,71 @@ def definition(name: str, ros_version: int) -> tuple[str, str]:
     return text, digest
 
 
-def serialised(stream: Stream, ros_version: int) -> Iterator[bytes]:
-    """Yield the messages of a stream as bytes, in its order.
+class MessageTable:
+    """The messages of a stream without blobs, as rows of bytes.
 
-    The serialiser writes one message of each stream. All others have the same layout, and differ from it in the places of
-    those fields that change, where whole columns are put at once; only frames of a camera are written one by one.
+    The serialiser writes one message. All others have the same layout, and differ from it in the places of those fields that
+    change, where whole columns are put at once.
+
+    Attributes
+    ----------
+    size
+        Of every message [bytes].
     """
+
+    def __init__(self, stream: Stream, ros_version: int) -> None:
+        store, message = typestore(ros_version), _message(stream, ros_version)
+        self._template = _bytes(store, message, stream.type, ros_version)
+        self.size = len(self._template)
+        places = _places(store, stream.type, message, ros_version)
+        seconds, nanoseconds = np.divmod(stream.stamp_ns, 10**9)
+        self._columns = {"header.stamp.sec": seconds, "header.stamp.nanosec": nanoseconds, **stream.columns}
+        if ros_version == 1:
+            self._columns["header.seq"] = np.arange(len(stream.stamp_ns))
+        offsets, formats = zip(*(places[path] for path in self._columns), strict=True)
+        self._layout = np.dtype(
+            {"names": list(self._columns), "formats": list(formats), "offsets": list(offsets), "itemsize": self.size}
+        )
+
+    def rows(self, start: int, stop: int) -> NDArray[np.void]:
+        """Return some of the messages, each one element."""
+        block = np.frombuffer(bytearray(self._template * (stop - start)), dtype=self._layout)
+        for path, values in self._columns.items():
+            block[path] = values[start:stop]
+        return block.view(f"V{self.size}")
+
+
+def serialised(stream: Stream, ros_version: int) -> Iterator[bytes]:
+    """Yield the messages of a stream as bytes, in its order; only frames of a camera are written one by one."""
     if stream.whole:
         yield from stream.whole
-        return
-    store = typestore(ros_version)
-    message = _blank(store, stream.type)
+    elif stream.blobs:
+        yield from _one_by_one(stream, _message(stream, ros_version), ros_version)
+    else:
+        table = MessageTable(stream, ros_version)
+        count = len(stream.stamp_ns)
+        for start in range(0, count, BLOCK):
+            data = table.rows(start, min(start + BLOCK, count)).tobytes()
+            for place in range(0, len(data), table.size):
+                yield data[place : place + table.size]
+
+
+def sizes(stream: Stream, ros_version: int) -> NDArray[np.int64]:
+    """Return the size of every message of a stream of blobs or whole messages [bytes]."""
+    if stream.whole:
+        return np.array([len(one) for one in stream.whole], dtype=np.int64)
+    # The blob is the last field: what stands before it has the same length in all of them.
+    first = next(_one_by_one(stream, _message(stream, ros_version), ros_version))
+    return np.array([len(one) for one in stream.blobs], dtype=np.int64) + (len(first) - len(stream.blobs[0]))
+
+
+def _message(stream: Stream, ros_version: int) -> Any:
+    """Return a message of a stream with what all of its messages share."""
+    message = _blank(typestore(ros_version), stream.type)
     _put(message, "header.frame_id", stream.frame_id)
     for path, value in stream.constants.items():
         _put(message, path, value)
-    if stream.blobs:
-        yield from _one_by_one(stream, message, ros_version)
-        return
-    template = _bytes(store, message, stream.type, ros_version)
-    places = _places(store, stream.type, message, ros_version)
-    seconds, nanoseconds = np.divmod(stream.stamp_ns, 10**9)
-    columns = {"header.stamp.sec": seconds, "header.stamp.nanosec": nanoseconds, **stream.columns}
-    if ros_version == 1:
-        columns["header.seq"] = np.arange(len(stream.stamp_ns))
-    offsets, formats = zip(*(places[path] for path in columns), strict=True)
-    layout = np.dtype(
-        {"names": list(columns), "formats": list(formats), "offsets": list(offsets), "itemsize": len(template)}
-    )
-    for start in range(0, len(stream.stamp_ns), BLOCK):
-        rows = range(len(stream.stamp_ns))[start : start + BLOCK]
-        block = np.frombuffer(bytearray(template * len(rows)), dtype=layout)
-        for path, values in columns.items():
-            block[path] = values[start : start + BLOCK]
-        data = block.tobytes()
-        for place in range(0, len(data), len(template)):
-            yield data[place : place + len(template)]
+    return message
 
 
 def _one_by_one(stream: Stream, message: Any, ros_version: int) -> Iterator[bytes]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.files import check_result, taken, unwritable
 from ferryid.ingest import log_suffixes
-from ferryid.ingest.rosbag2_metadata import NAME, read_metadata
+from ferryid.ingest.formats.rosbag2 import NAME
 
 STORAGES = ("sqlite3", "mcap")
 STARTS = {".mcap": b"\x89MCAP0\r\n", ".bag": b"#ROSBAG V"}
@@ -136,6 +136,8 @@ def _is_recording(folder: Path) -> bool:
     """Tell whether a folder is a recording, and holds nothing but what its metadata.yaml lists."""
     if not (folder / NAME).is_file():
         return False
+    from ferryid.ingest.rosbag2_metadata import read_metadata
+
     stated = read_metadata(folder / NAME)
     if isinstance(stated, str):
         return False

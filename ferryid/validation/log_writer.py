@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from ferryid.files import replacing
-from ferryid.simulate.recorders import write_mcap, write_ros1, write_ros2
+from ferryid.simulate.recorders import write_mcap
+from ferryid.simulate.rosbag_recorders import write_ros1, write_ros2
 from ferryid.simulate.sensors import Stream
 from ferryid.types import Floats
 from ferryid.validation.plant.motion import BODY

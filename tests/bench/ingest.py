@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import shutil
 import subprocess
 import sys
@@ -155,7 +156,7 @@ def against_least_work(folder: Path, minutes: float) -> list[Row]:
                 lambda log=log: columns_to_parquet(log),
                 "decompress all + write the same Parquet",
                 limit,
-                1.3 if compression == "zstd" else 1.8,
+                1.5 if compression == "zstd" else 2.0,
                 5,
             )
         )
@@ -197,6 +198,8 @@ def against_rerun(folder: Path, minutes: float) -> list[Row]:
 
 OURS = "from ferryid.cli.main import main; main()"
 THEIRS = "from tests.bench.rivals import main; main()"
+SMALL_MCAP = "from tests.bench.rivals import main_small_mcap as main; main()"
+SMALL_MCAP_ALL = "from tests.bench.rivals import main_small_mcap_all as main; main()"
 PEAK = """
 import atexit, sys
 def peak():
@@ -218,26 +221,41 @@ def process(log: Path, before: str = "") -> str:
         return script(before + OURS, "ingest", log, "--vessel", PROFILE, "--out", out)
 
 
-def rival_process(log: Path, before: str = "") -> str:
-    """rosbags and pandas as a process of their own."""
+def rival_process(log: Path, before: str = "", code: str = THEIRS) -> str:
+    """rosbags and pandas, or another rival, as a process of their own."""
     with scratch() as out:
-        return script(before + THEIRS, log, out)
+        return script(before + code, log, out)
 
 
 def as_process(folder: Path, minutes: float) -> list[Row]:
-    """One whole process, start-up included."""
-    return [
+    """One whole process, start-up included; where they are installed, against the fastest readers in Python as well."""
+    rows = [
         faster(
             f"{minutes:g} min {NAMES[kind]} {compression}: whole process",
             lambda log=log: process(log),
             "rosbags and pandas in a process",
             lambda log=log: rival_process(log),
-            10.0,
+            8.0,
             5,
         )
         for kind, compression in (("mcap", "zstd"), ("bag", "lz4"), ("db3", "none"))
         for log in (logs.log(folder, kind, compression, minutes),)
     ]
+    if not all(importlib.util.find_spec(name) for name in ("small_mcap", "mcap_ros2_support_fast")):
+        return rows
+    log = logs.log(folder, "mcap", "zstd", minutes)
+    for told, code in (("the mapped topics", SMALL_MCAP), ("all topics", SMALL_MCAP_ALL)):
+        rows.append(
+            faster(
+                f"{minutes:g} min MCAP zstd: whole process",
+                lambda: process(log),
+                f"small-mcap with mcap-ros2-support-fast and pandas, {told}",
+                lambda code=code: rival_process(log, code=code),
+                1.0,
+                5,
+            )
+        )
+    return rows
 
 
 def peak_mb(said: str) -> float:
@@ -289,5 +307,16 @@ def run(quick: bool, folder: Path | None = None) -> Section:
             f"Logs with camera hold raw 1280 x 720 pictures at {logs.CAMERA_HZ:g} Hz, {camera:g} minutes, about "
             f"{camera * 0.332:.2g} GB (the goal was set on 3.9 GB).",
         ),
-        ("rosbags", "pandas", "pyarrow", "numpy", "mcap", "zstandard", "lz4", "rerun-sdk"),
+        (
+            "rosbags",
+            "pandas",
+            "pyarrow",
+            "numpy",
+            "mcap",
+            "zstandard",
+            "lz4",
+            "rerun-sdk",
+            "small-mcap",
+            "mcap-ros2-support-fast",
+        ),
     )

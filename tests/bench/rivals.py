@@ -6,6 +6,7 @@ Nothing heavy is imported before it is needed: `main` also runs in a process of 
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from operator import attrgetter
 from pathlib import Path
 from typing import Any
@@ -43,6 +44,32 @@ def rosbags_to_parquet(log: Path, out: Path) -> None:
         table.to_parquet(out / f"{number}.parquet")
 
 
+def small_mcap_to_parquet(log: Path, out: Path, every: bool = False) -> None:
+    """Decode with small-mcap and mcap-ros2-support-fast, and write the wanted fields with pandas.
+
+    With `every`, messages of all topics are decoded, and the same fields are kept.
+    """
+    import pandas as pd
+    from mcap_ros2_support_fast.decoder import DecoderFactory
+    from small_mcap import read_message_decoded
+
+    rows: dict[str, list[tuple[Any, ...]]] = {topic: [] for topic in FIELDS}
+    pick = {topic: attrgetter(*STAMP, *fields) for topic, fields in FIELDS.items()}
+
+    def wanted(channel: Any, _schema: Any) -> bool:
+        return every or channel.topic in FIELDS
+
+    with log.open("rb") as file:
+        for found in read_message_decoded(file, should_include=wanted, decoder_factories=[DecoderFactory()]):
+            topic = found.channel.topic
+            message = found.decoded_message
+            if topic in FIELDS:
+                rows[topic].append((found.message.log_time, *pick[topic](message)))
+    for number, (topic, kept) in enumerate(rows.items()):
+        table = pd.DataFrame(kept, columns=["time_ns", "sec", "nanosec", *FIELDS[topic]])
+        table.to_parquet(out / f"{number}.parquet")
+
+
 def rerun_columns(log: Path) -> dict[str, dict[str, Any]]:
     """Read the wanted fields of an MCAP file to NumPy arrays with rerun-sdk's Rust reader."""
     import numpy as np
@@ -69,6 +96,16 @@ def rerun_columns(log: Path) -> dict[str, dict[str, Any]]:
     }
 
 
-def main() -> None:
+def main(convert: Callable[[Path, Path], None] = rosbags_to_parquet) -> None:
     """Convert the log named first on the command line into the folder named second."""
-    rosbags_to_parquet(Path(sys.argv[1]), Path(sys.argv[2]))
+    convert(Path(sys.argv[1]), Path(sys.argv[2]))
+
+
+def main_small_mcap() -> None:
+    """`main` with small-mcap, the mapped topics alone."""
+    main(small_mcap_to_parquet)
+
+
+def main_small_mcap_all() -> None:
+    """`main` with small-mcap, messages of all topics decoded."""
+    main(lambda log, out: small_mcap_to_parquet(log, out, every=True))

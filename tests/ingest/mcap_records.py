@@ -11,8 +11,8 @@ import lz4.frame
 import numpy as np
 import zstandard
 
-from ferryid.ingest.formats.mcap import McapLog
 from ferryid.ingest.log import Loss
+from ferryid.ingest.mcap_reader import McapLog
 
 MAGIC = b"\x89MCAP0\r\n"
 T0 = 1_700_000_000_000_000_000

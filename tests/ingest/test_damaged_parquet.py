@@ -133,7 +133,7 @@ def test_an_empty_first_row_group_is_skipped(tmp_path: Path) -> None:
 
 def test_a_footer_that_claims_more_than_the_file_can_hold_is_refused(tmp_path: Path) -> None:
     rows = 200_000_000
-    import ferryid.ingest.formats.parquet_table as module
+    import ferryid.ingest.parquet_reader as module
 
     parquet.write_table(pa.table(columns()), tmp_path / "log.parquet")
     with pytest.MonkeyPatch.context() as patch:

@@ -21,8 +21,8 @@ from rosbags.typesys import Stores, get_typestore
 from ferryid.errors import FerryIdError
 from ferryid.ingest import definitions, open_log
 from ferryid.ingest.definitions import DefinitionError, parse_definition, typestore_of
-from ferryid.ingest.formats.mcap import McapLog
 from ferryid.ingest.layout import leaf_fields
+from ferryid.ingest.mcap_reader import McapLog
 from ferryid.ingest.protobuf import message_class, protobuf_fields
 from ferryid.ingest.ros2_types import RecordedText, define
 

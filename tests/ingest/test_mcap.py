@@ -25,7 +25,8 @@ from rosbags.typesys import Stores, get_typestore
 
 from ferryid.errors import FerryIdError
 from ferryid.ingest import open_log
-from ferryid.ingest.formats.mcap import FORMAT, McapLog, open_mcap
+from ferryid.ingest.formats.mcap import FORMAT
+from ferryid.ingest.mcap_reader import McapLog, open_mcap
 
 STORES = {"ros1": get_typestore(Stores.ROS1_NOETIC), "cdr": get_typestore(Stores.ROS2_HUMBLE)}
 POINT = "geometry_msgs/msg/PointStamped"

@@ -11,7 +11,7 @@ import zstandard
 
 from ferryid.errors import FerryIdError
 from ferryid.ingest import mcap_index
-from ferryid.ingest.formats.mcap import McapLog
+from ferryid.ingest.mcap_reader import McapLog
 from tests.ingest.mcap_records import (
     COUNT,
     DATA_END,

@@ -19,7 +19,7 @@ from mcap.writer import Writer
 from mcap_protobuf.decoder import DecoderFactory
 
 from ferryid.errors import FerryIdError
-from ferryid.ingest.formats.mcap import McapLog
+from ferryid.ingest.mcap_reader import McapLog
 
 T0 = 1_700_000_000_000_000_000
 NUMERIC = {

@@ -12,7 +12,7 @@ from ferryid.identify.outcome import FitOutcome
 from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.settings import FitSettings
 from ferryid.report import figures
-from ferryid.report.page import headline
+from ferryid.report.headline import headline_of
 from ferryid.report.structure import worst_and_best_minute
 from ferryid.types import AXES, RunContext
 from ferryid.vessel import load_profile
@@ -113,7 +113,13 @@ def section(case: Case, result: FitOutcome, folder: Path) -> str:
     (folder / f"{case.name}-forces.svg").write_text(
         figures.forces(last, start, None if start is None else start + 60.0), encoding="utf-8"
     )
-    lines = [f"\n## {case.name}\n", case.about, "", f"**{headline(result)}** {' '.join(result.acceptance.reasons)}", ""]
+    lines = [
+        f"\n## {case.name}\n",
+        case.about,
+        "",
+        f"**{headline_of(result)}** {' '.join(result.acceptance.reasons)}",
+        "",
+    ]
     lines += ["| validation | " + " | ".join(AXES) + " |", "|---|" + "---|" * 3]
     for label, part in (
         (f"rms {result.scores.measure} error, base [N, N, N·m]", "base"),

@@ -13,7 +13,8 @@ import pytest
 from ferryid.identify.outcome import FitOutcome
 from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.settings import FitSettings
-from ferryid.report.page import headline, render
+from ferryid.report.headline import headline_of
+from ferryid.report.page import render
 from ferryid.types import RunContext
 from ferryid.vessel import load_profile
 
@@ -61,7 +62,7 @@ def test_is_well_formed_and_every_figure_has_a_caption(result: FitOutcome) -> No
 
 def test_verdict_comes_before_any_figure(result: FitOutcome) -> None:
     page = html.unescape(render(result)[0])
-    assert page.index(headline(result)) < page.index("<svg")
+    assert page.index(headline_of(result)) < page.index("<svg")
     rejected = replace(result, acceptance=replace(result.acceptance, accepted=False))
     assert "Not accepted" in render(rejected)[0]
 

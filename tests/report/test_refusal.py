@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ferryid.errors import FerryIdError, UnwritableError
-from ferryid.report import refusal
+from ferryid.report import refusal_page
 from ferryid.report.held_signals import held_log
 from ferryid.report.interactive import available
 from ferryid.report.refusal import shown_where_refused
@@ -89,18 +89,18 @@ def test_what_is_not_about_a_log_has_no_page(error: Exception, tmp_path: Path) -
 
 @pytest.mark.parametrize("head", ["short", "short.mcap", LOG, "other, short"])
 def test_a_log_is_known_by_its_name_or_path(head: str) -> None:
-    assert refusal._concerned(f"{head}: odd. Fix: none", [LOG, "b.mcap"], load_profile("milliampere")) == [LOG]
+    assert refusal_page._concerned(f"{head}: odd. Fix: none", [LOG, "b.mcap"], load_profile("milliampere")) == [LOG]
 
 
 def test_a_fault_of_the_signal_map_concerns_all_logs() -> None:
     profile = load_profile("milliampere")
     for place in (f"{profile.path}", f"{profile.path}:12"):
-        assert refusal._concerned(f"{place}: odd. Fix: none", [LOG, "b.mcap"], profile) == [LOG, "b.mcap"]
+        assert refusal_page._concerned(f"{place}: odd. Fix: none", [LOG, "b.mcap"], profile) == [LOG, "b.mcap"]
 
 
 def test_a_page_that_cannot_be_made_leaves_the_error_as_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "reports").write_text("taken", encoding="utf-8")
     error = FerryIdError("short: odd. Fix: none")
     assert shown(error, tmp_path) == str(error)
-    monkeypatch.setattr(refusal, "held_log", refusing(ZeroDivisionError("a bug")))
+    monkeypatch.setattr(refusal_page, "held_log", refusing(ZeroDivisionError("a bug")))
     assert shown(error, tmp_path / "other") == str(error)

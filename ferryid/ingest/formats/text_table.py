@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ferryid.ingest.log import Format, TableLayout
-from ferryid.ingest.table_text import looks_like_text, open_text
-from ferryid.ingest.tables import TableReader
+from ferryid.ingest.log import Format, Reader, TableLayout
 
 CERTAIN = (".csv", ".tsv")
 """Suffixes of nothing else than tables: a damaged byte does not make such a file something else."""
@@ -15,10 +13,19 @@ SUFFIXES = (*CERTAIN, ".txt", ".dat", ".asc", ".tab", ".prn", ".log", ".out")
 
 def _matches(path: Path, head: bytes) -> bool:
     suffix = path.suffix.lower()
-    return path.is_file() and (suffix in CERTAIN or (suffix in SUFFIXES and looks_like_text(head)))
+    if suffix not in SUFFIXES or not path.is_file():
+        return False
+    if suffix in CERTAIN:
+        return True
+    from ferryid.ingest.table_text import looks_like_text
+
+    return looks_like_text(head)
 
 
-def _open(path: Path, layout: TableLayout | None) -> TableReader:
+def _open(path: Path, layout: TableLayout | None) -> Reader:
+    from ferryid.ingest.table_text import open_text
+    from ferryid.ingest.tables import TableReader
+
     return TableReader([open_text(path, layout)])
 
 

@@ -1,0 +1,247 @@
+"""DataFlash logs of ArduPilot (``.bin``): messages that the log itself defines; one topic for each, and for each instance.
+
+The format is published by ArduPilot (libraries/AP_Logger/LogStructure.h). It has no checksums and no index: opening looks at
+the head of every message, and decodes none but the definitions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.errors import FerryIdError
+from ferryid.ingest.formats.dataflash import FMT, HEAD_BYTES, SYNC
+from ferryid.ingest.log import Loss, TableLayout
+from ferryid.ingest.records import (
+    RecordField,
+    RecordReader,
+    RecordTable,
+    column_of,
+    damage_loss,
+    file_bytes,
+    instance_name,
+    utc_offset_ns,
+    with_places,
+)
+
+_FMT_SIZE = 89
+_TYPES: Mapping[str, tuple[str, float]] = {
+    "b": ("<i1", 1.0), "B": ("<u1", 1.0), "M": ("<u1", 1.0), "h": ("<i2", 1.0), "H": ("<u2", 1.0),
+    "i": ("<i4", 1.0), "I": ("<u4", 1.0), "q": ("<i8", 1.0), "Q": ("<u8", 1.0),
+    "g": ("<f2", 1.0), "f": ("<f4", 1.0), "d": ("<f8", 1.0),
+    "c": ("<i2", 100.0), "C": ("<u2", 100.0), "e": ("<i4", 100.0), "E": ("<u4", 100.0), "L": ("<i4", 1e7),
+    "n": ("S4", 1.0), "N": ("S16", 1.0), "Z": ("S64", 1.0),
+}  # fmt: skip
+"""Letter of a definition to the type of its field, and how many times as large the file has it (LogStructure.h)."""
+_TIMES: Mapping[str, int] = {"TimeUS": 1000, "TimeMS": 1_000_000, "timestamp": 1000}
+"""Names of the field with the time since start-up, and its unit [ns]."""
+_ARRAY = 32
+_DEFINITIONS = frozenset({"FMT", "UNIT", "MULT", "FMTU", "PARM", "FILE"})
+"""What a log states of itself once, and files that are kept in it: no signals."""
+_CHAIN = 4
+"""Heads in a row by which messages are recognised again after a damaged stretch."""
+_GPS_EPOCH_S, _WEEK_S, _LEAP_S = 315_964_800, 604_800, 18
+"""GPS time began on 1980-01-06, and has been ahead of UTC by 18 s since 2017."""
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """One definition of a message: name, size with its head, letters of the fields, their labels."""
+
+    name: str
+    size: int
+    letters: str
+    labels: tuple[str, ...]
+
+
+@dataclass
+class _Scan:
+    layouts: dict[int, _Layout] = field(default_factory=lambda: {FMT: _Layout("FMT", _FMT_SIZE, "", ())})
+    places: dict[int, list[int]] = field(default_factory=dict)
+    stretches: int = 0
+    lost_bytes: int = 0
+    cut: bool = False
+
+
+def open_dataflash(path: Path, layout: TableLayout | None) -> RecordReader:
+    data = file_bytes(path)
+    raw = data.tobytes()
+    scan = _scanned(raw)
+    tables = [
+        table
+        for number, places in scan.places.items()
+        for table in _tables(data, scan, scan.layouts[number], np.asarray(places, np.int64))
+    ]
+    tables = _distinct(tables)
+    if not tables:
+        raise FerryIdError(
+            f"{path}: the ArduPilot log holds no data, found {len(scan.layouts) - 1} definitions"
+            f"{' and damage' if scan.stretches or scan.cut else ''}. Fix: download it from the autopilot again, or set "
+            "LOG_DISARMED where the vessel was never armed"
+        )
+    since_ns = _utc(data, tables)
+    note = (
+        "times counted from the start-up of the autopilot: no receiver knew UTC"
+        if since_ns is None
+        else "times of the autopilot in UTC, as its receiver had it"
+    )
+    losses = damage_loss(path, "ArduPilot log", scan.stretches, scan.lost_bytes)
+    if scan.cut:
+        losses.append(Loss(str(path), "the ArduPilot log ends within a message: the end of the recording is missing"))
+    return RecordReader(path, data, tables, losses, encoding="dataflash", since_ns=since_ns or 0, note=note)
+
+
+def _scanned(raw: bytes) -> _Scan:
+    """Go from head to head; where something else than a message begins, to the next place where messages do."""
+    scan = _Scan()
+    sizes = {FMT: _FMT_SIZE}
+    position, end = 0, len(raw)
+    while position < end:
+        number = raw[position + 2] if position + 2 < end else -1
+        size = sizes.get(number)
+        after = position + (size or 0)
+        if size is None or raw[position : position + 2] != SYNC or (after < end and not _head(raw, after)):
+            if size is None and raw[position : position + 2] == SYNC[: end - position] and position + 3 > end:
+                scan.cut = True
+                break
+            resumed = _resumed(raw, position + 1, sizes)
+            scan.stretches += 1
+            scan.lost_bytes += resumed - position
+            position = resumed
+            continue
+        if after > end:
+            # An erased end of the memory is no message.
+            scan.cut = True
+            break
+        if number == FMT:
+            made = _definition(raw[position + HEAD_BYTES : after])
+            if made is not None and made[0] != FMT:
+                kind, stated = made
+                known = scan.layouts.get(kind)
+                if known is None or not scan.places[kind]:
+                    scan.layouts[kind], sizes[kind], scan.places[kind] = stated, stated.size, []
+        else:
+            scan.places[number].append(position + HEAD_BYTES)
+        position = after
+    return scan
+
+
+def _head(raw: bytes, position: int) -> bool:
+    return raw[position : position + 2] == SYNC[: len(raw) - position]
+
+
+def _definition(content: bytes) -> tuple[int, _Layout] | None:
+    """Return the message type that a definition is of, and its layout; None where the parts contradict each other."""
+    kind, size = content[0], content[1]
+    name, letters, labels = (
+        content[start:stop].split(b"\0")[0].decode("ascii", "replace") for start, stop in ((2, 6), (6, 22), (22, 86))
+    )
+    labels_found = tuple(label.strip() for label in labels.split(",") if label.strip())
+    if (
+        not name
+        or size <= HEAD_BYTES
+        or not letters
+        or any(letter not in _TYPES and letter != "a" for letter in letters)
+    ):
+        return None
+    if HEAD_BYTES + sum(_size(letter) for letter in letters) != size or len(labels_found) != len(letters):
+        return None
+    return kind, _Layout(name, size, letters, labels_found)
+
+
+def _size(letter: str) -> int:
+    return 2 * _ARRAY if letter == "a" else np.dtype(_TYPES[letter][0]).itemsize
+
+
+def _tables(data: NDArray[np.uint8], scan: _Scan, layout: _Layout, places: NDArray[np.int64]) -> list[RecordTable]:
+    """Return the topics of one message: one, or one for each instance that its definition names."""
+    if layout.name in _DEFINITIONS or not len(places):
+        return []
+    fields: dict[str, RecordField] = {}
+    at = 0
+    for letter, label in zip(layout.letters, layout.labels, strict=True):
+        if letter == "a":
+            fields |= {f"{label}[{k}]": RecordField(at + 2 * k, np.dtype("<i2")) for k in range(_ARRAY)}
+        else:
+            dtype, divisor = _TYPES[letter]
+            fields[label] = RecordField(at, np.dtype(dtype), divisor)
+        at += _size(letter)
+    clock = next((name for name in _TIMES if name in fields and fields[name].dtype.kind in "iu"), None)
+    if clock is None:
+        return []
+    whole = RecordTable(instance_name(layout.name, 0), layout.name, fields, places, clock, _TIMES[clock])
+    label = _instance_label(data, scan, layout)
+    if not label or fields[label].dtype.kind not in "iu":
+        return [whole]
+    numbers = column_of(data, whole, label)
+    return [
+        with_places(
+            RecordTable(instance_name(layout.name, int(number)), layout.name, fields, places, clock, _TIMES[clock]),
+            places[numbers == number],
+        )
+        for number in np.unique(numbers)
+    ]
+
+
+def _instance_label(data: NDArray[np.uint8], scan: _Scan, layout: _Layout) -> str:
+    """Return the field that counts devices of one kind, by the units that the log states ("#"), or an empty string."""
+    for number, units in scan.layouts.items():
+        if units.name != "FMTU" or units.letters != "QBNN":
+            continue
+        for place in scan.places.get(number, ()):
+            kind = int(data[place + 8])
+            if scan.layouts.get(kind) == layout:
+                marks = bytes(data[place + 9 : place + 25]).split(b"\0")[0].decode("ascii", "replace")
+                found = marks.find("#")
+                return layout.labels[found] if 0 <= found < len(layout.labels) else ""
+    return ""
+
+
+def _distinct(tables: list[RecordTable]) -> list[RecordTable]:
+    """Number topics of one name, which two definitions may have."""
+    found: dict[str, RecordTable] = {}
+    for table in tables:
+        name, number = table.name, 2
+        while name in found:
+            name, number = f"{table.name} ({number})", number + 1
+        found[name] = RecordTable(name, table.type, table.fields, table.places, table.time, table.time_ns)
+    return list(found.values())
+
+
+def _resumed(raw: bytes, position: int, sizes: Mapping[int, int]) -> int:
+    """Return the next place from which messages follow each other, or the end of the file."""
+    while (position := raw.find(SYNC, position)) >= 0:
+        if _chained(raw, position, sizes):
+            return position
+        position += 1
+    return len(raw)
+
+
+def _chained(raw: bytes, position: int, sizes: Mapping[int, int]) -> bool:
+    for _ in range(_CHAIN):
+        if position == len(raw):
+            return True
+        if position + HEAD_BYTES > len(raw) or raw[position : position + 2] != SYNC:
+            return False
+        size = sizes.get(raw[position + 2])
+        if size is None or position + size > len(raw):
+            return False
+        position += size
+    return True
+
+
+def _utc(data: NDArray[np.uint8], tables: list[RecordTable]) -> int | None:
+    """Return by how much UTC is later than the autopilot's clock [ns], by its receivers; None where none knew it."""
+    for table in tables:
+        if table.type != "GPS" or not {"GMS", "GWk"} <= table.fields.keys():
+            continue
+        clock = column_of(data, table, table.time).astype(float) * (table.time_ns * 1e-9)
+        weeks, ms = (column_of(data, table, name).astype(float) for name in ("GWk", "GMS"))
+        known = np.where(weeks > 0, _GPS_EPOCH_S - _LEAP_S + weeks * _WEEK_S + ms * 1e-3, 0.0)
+        if (offset := utc_offset_ns(clock, known)) is not None:
+            return offset
+    return None

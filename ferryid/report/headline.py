@@ -1,0 +1,30 @@
+"""The verdict of a fit in one sentence, for its page, its JSON and a terminal."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ferryid.counts import counted, verb
+from ferryid.identify import FitOutcome
+from ferryid.vessel import parse_profile
+
+
+def headline_of(result: FitOutcome) -> str:
+    """Return the verdict in one sentence."""
+    change = result.acceptance.normalised_mse - 1.0
+    hull = parse_profile(result.model.profile_text, result.model.name).hull
+    base = "the base model's" if hull.has_model else "that of the base model, which is rigid-body mass alone,"
+    if not np.isfinite(change):
+        told = f"its {result.scores.measure} error could not be compared with the base model's"
+    else:
+        word = "below" if change < 0 else "above"
+        told = f"mean square {result.scores.measure} error {abs(change):.1%} {word} {base} on data it did not see"
+    count = len(result.warnings)
+    trust = (
+        f" Read the {counted(count, 'warning')} first." if count > 1 else " Read the warning first." if count else ""
+    )
+    if result.acceptance.accepted:
+        return f"Accepted: {told}.{trust}"
+    failed = [check for check in result.acceptance.checks if check.passed is False]
+    why = f", but {counted(len(failed), 'condition')} {verb(len(failed), 'fails')}" if failed and change < 0 else ""
+    return f"Not accepted: {told}{why}."

@@ -1,0 +1,60 @@
+"""Values that the command line makes itself are those that typer makes, and its errors are typer's."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import pytest
+import typer
+from typer.core import TyperCommand
+
+from ferryid.cli.plain_values import PlainCommand
+
+WORDS = (
+    [],
+    ["a", "b", "--number", "12", "--share", "0.25", "--path", "x/y", "--flag", "--name", "ü"],
+    ["--number", "-3", "--share", "1e-3", "--path", "", "--no-flag"],
+    ["--number", " 7 ", "--share", "inf"],
+    ["--number", "1_000", "--share", ".5"],
+    ["--number", "99999999999999999999", "--share", "nan"],
+    ["--number", "seven"],
+    ["--share", "half"],
+    ["--number", "1.0"],
+    ["--within", "11"],
+    ["--within", "3"],
+    ["--folder", "nowhere"],
+    ["--kind", "both"],
+)
+
+
+def parsed(cls: type[TyperCommand], words: list[str]) -> Any:
+    """Return the values that a command gets, or the error."""
+    got: dict[str, Any] = {}
+
+    def command(
+        logs: Annotated[list[str] | None, typer.Argument()] = None,
+        number: Annotated[int | None, typer.Option()] = None,
+        share: Annotated[float, typer.Option()] = 1.0,
+        path: Annotated[Path | None, typer.Option()] = None,
+        folder: Annotated[Path | None, typer.Option(exists=True)] = None,
+        flag: Annotated[bool, typer.Option("--flag/--no-flag")] = False,
+        name: Annotated[str, typer.Option()] = "none",
+        kind: Annotated[str, typer.Option()] = "one",
+        within: Annotated[int, typer.Option(min=1, max=9)] = 5,
+    ) -> None:
+        got.update(locals())
+
+    app = typer.Typer(add_completion=False, rich_markup_mode=None)
+    app.command("x", cls=cls)(command)
+    try:
+        typer.main.get_command(app).main(words, prog_name="x", standalone_mode=False)
+    except Exception as error:  # noqa: BLE001 - both must fail alike
+        return type(error), str(error)
+    got.pop("got", None)
+    return {name: (type(value), repr(value)) for name, value in got.items()}
+
+
+@pytest.mark.parametrize("words", WORDS, ids=" ".join)
+def test_values_and_errors_are_those_of_typer(words: list[str]) -> None:
+    assert parsed(PlainCommand, words) == parsed(TyperCommand, words)

@@ -1,0 +1,61 @@
+"""Which heavy packages each command loads: those that it needs, and no others."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+HEAVY = (
+    "aiohttp", "apsw", "distributed", "google.protobuf", "jinja2", "matplotlib", "mcap", "numba", "pandas", "pyarrow",
+    "pyarrow.dataset", "pydantic", "rich", "rosbags", "rosbags.highlevel", "rosbags.rosbag2", "ruamel", "scipy",
+    "scipy.cluster", "scipy.optimize", "scipy.signal", "scipy.spatial", "scipy.special", "scipy.stats", "sqlite3",
+)  # fmt: skip
+"""What takes more than some hundredths of a second to load."""
+READS = {"mcap", "rosbags"}
+KEEPS = {"pyarrow"}
+MODELS = {"numba", "scipy"}
+"""numba loads what it has compiled, and looks for scipy."""
+ESTIMATES = {*MODELS, "scipy.special", "scipy.optimize", "scipy.spatial"}
+LOG = "fixtures/short.mcap"
+VESSEL = ("--vessel", "milliampere")
+COMMANDS: dict[str, tuple[tuple[str, ...], set[str]]] = {
+    "inspect": (("inspect", LOG), READS | {"scipy", "scipy.special"}),
+    "ingest": (("ingest", LOG, *VESSEL), READS | KEEPS),
+    "ingest again": (("ingest", LOG, *VESSEL), KEEPS),
+    "fit": (("fit", LOG, *VESSEL, "--accept", "thesis", "--no-report"), ESTIMATES | KEEPS),
+    "fit with its page": (("fit", LOG, *VESSEL, "--accept", "thesis"), ESTIMATES | KEEPS | {"matplotlib", "jinja2"}),
+    "evaluate": (("evaluate", "milliampere@1", LOG), ESTIMATES | KEEPS),
+    "models": (("models",), MODELS),
+    "export": (("export", "milliampere@1", "--to", "python"), MODELS | {"scipy.special"}),
+    "simulate": (("simulate", "four-corner"), MODELS | READS),
+    "vessel list": (("vessel", "list"), set()),
+    "vessel check": (("vessel", "check", "milliampere"), set()),
+}
+PROGRAM = """
+import json, sys
+from ferryid.cli.main import main
+sys.argv = ["ferryid", *sys.argv[1:]]
+try:
+    main()
+except SystemExit as end:
+    assert not end.code, end.code
+print(json.dumps(sorted(sys.modules)), file=sys.stderr)
+"""
+
+
+@pytest.mark.slow
+def test_a_command_loads_what_it_needs(tmp_path: Path) -> None:
+    # In one test, as commands use what those before them leave.
+    too_much = {}
+    for name, (words, needed) in COMMANDS.items():
+        out = () if words[0] == "vessel" or words[0] == "inspect" else ("--out", str(tmp_path))
+        run = subprocess.run([sys.executable, "-c", PROGRAM, *words, *out], capture_output=True, text=True, check=False)
+        assert run.returncode == 0, run.stderr
+        loaded = set(json.loads(run.stderr.splitlines()[-1]))
+        if more := loaded & set(HEAVY) - needed:
+            too_much[name] = sorted(more)
+    assert not too_much
