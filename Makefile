@@ -47,8 +47,9 @@ picture: demo
 	cp $(DEMO)/reports/milliampere-v1/forces-twelve-corner.svg reports/demo/forces.svg
 	$(BIN)/python -m tests.evidence reports/demo/forces.svg
 
+# Writes reports/benchmarks.md; QUICK=1 prints the page of a run on short logs instead, to see that everything runs.
 bench: $(VENV)/installed $(VENV)/bench-installed
-	$(BIN)/python -m tests.bench
+	$(BIN)/python -m tests.bench $(if $(QUICK),--quick)
 
 # Damaged and hostile logs of every format: writes reports/attack.md. CASES=N takes more of them, SEED=N repeats a run; several
 # seeds (SEED="1 2") are several runs on one page.

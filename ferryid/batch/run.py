@@ -113,8 +113,11 @@ def batch(
     with alone(folder, wait=False):
         remove_abandoned(out / "logs")
         kept = Kept(folder / "results")
+        # The same for all logs, of which there may be thousands.
+        asked_for, place = _hash(dump_json(chosen.plain())), out.resolve()
         tasks = [
-            _task(entry, patients.get(entry.vessel), chosen, limit, again, out.resolve(), ranges) for entry in entries
+            _task(entry, patients.get(entry.vessel), chosen, asked_for, limit, again, place, ranges)
+            for entry in entries
         ]
         rows: dict[int, tuple[Path, LogResult]] = {}
         for number, (entry, task) in enumerate(zip(entries, tasks, strict=True)):
@@ -172,6 +175,7 @@ def _task(
     entry: Entry,
     of: tuple[Profile, Model | None] | None,
     recipe: Recipe,
+    recipe_hash: str,
     limit: int,
     again: bool,
     out: Path,
@@ -181,7 +185,7 @@ def _task(
     text = None if model is None else dump_json(model_to_json(model))
     stamp = {
         "version": __version__,
-        "recipe": _hash(dump_json(recipe.plain())),
+        "recipe": recipe_hash,
         "profile": _hash(entry.problem) if profile is None else profile.sha256,
         "model": "" if text is None else _hash(text),
     }

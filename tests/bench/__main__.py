@@ -10,12 +10,12 @@ from functools import partial
 from pathlib import Path
 
 import tests.bench as benches
-from tests.bench.page import page
+from tests.bench.page import drawing, page
 from tests.evidence import stamp
 
 REPORT = Path(__file__).resolve().parents[2] / "reports" / "benchmarks.md"
 # In the order of the page; every one exposes run(quick) -> Section.
-MODULES = ("ingest", "identify", "archive", "simulate", "diagnosis", "long")
+MODULES = ("ingest", "identify", "archive", "commands", "simulate", "diagnosis", "long")
 
 
 def main() -> int:
@@ -36,12 +36,13 @@ def main() -> int:
             if name == "ingest" and options.folder:
                 run = partial(run, folder=options.folder)
             sections.append(run(options.quick))
-    text = page(sections, options.quick)
     target = options.out or (None if options.quick or options.only else REPORT)
     if target is None or str(target) == "-":
-        print(text)
+        print(page(sections, options.quick))
     else:
-        target.write_text(text, encoding="utf-8")
+        picture = target.with_suffix(".svg")
+        picture.write_text(drawing(sections), encoding="utf-8")
+        target.write_text(page(sections, options.quick, picture.name), encoding="utf-8")
         stamp(target)
         print(f"written to {target}")
     missed = [row.what for section in sections for row in section.rows if row.reached is False]

@@ -10,6 +10,13 @@ import statistics
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from math import log10
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from ferryid.report.figures import BASE, MEASURED, NEW, STYLE, svg_text
 
 
 @dataclass(frozen=True)
@@ -23,6 +30,16 @@ class Row:
     ratio: float
     goal: str = ""
     reached: bool | None = None
+
+    @property
+    def over_goal(self) -> float | None:
+        """How many times as good as the goal asks for; None where a ratio has no goal of its own."""
+        sign, _, number = self.goal.partition(" ")
+        try:
+            wanted = float(number)
+        except ValueError:
+            return None
+        return self.ratio / wanted if sign == "≥" else wanted / self.ratio
 
 
 @dataclass(frozen=True)
@@ -84,8 +101,26 @@ def duration(value_s: float) -> str:
     return f"{value_s:.3g} s" if value_s >= 1 else f"{value_s * 1e3:.3g} ms"
 
 
-def page(sections: Sequence[Section], quick: bool) -> str:
-    """Return the page of all sections in Markdown."""
+def drawing(sections: Sequence[Section]) -> str:
+    """Return a figure (SVG) of every ratio over its goal: what ends to the right of the line is reached."""
+    rows = [(row, value) for section in sections for row in section.rows if (value := row.over_goal) is not None]
+    with mpl.rc_context(STYLE | {"font.size": 7}):
+        figure = Figure(figsize=(9.0, 0.6 + 0.17 * len(rows)), layout="tight")
+        ax = figure.subplots()
+        place = np.arange(len(rows))[::-1]
+        colours = [NEW if value >= 1.0 else BASE for _, value in rows]
+        ax.barh(place, [log10(value) for _, value in rows], color=colours, height=0.6)
+        ax.axvline(0.0, color=MEASURED, linewidth=0.8)
+        ax.set_yticks(place, [f"{row.what}; {row.rival}" for row, _ in rows])
+        ax.set_ylim(-0.7, len(rows) - 0.3)
+        shown = [-1.0, -log10(2.0), 0.0, log10(2.0), 1.0]
+        ax.set_xticks(shown, ["1/10", "1/2", "goal", "2", "10"])
+        ax.set_xlabel("ratio over its goal, or goal over the ratio where less is better")
+        return svg_text(figure)
+
+
+def page(sections: Sequence[Section], quick: bool, picture: str = "") -> str:
+    """Return the page of all sections in Markdown, with the address of their `drawing`."""
     packages = sorted({name for section in sections for name in section.packages})
     versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in packages)
     lines = [
@@ -99,6 +134,8 @@ def page(sections: Sequence[Section], quick: bool) -> str:
     ]
     if quick:
         lines += ["**A quick run on short logs: the goals are for long ones.**", ""]
+    if picture:
+        lines += [f"![Every ratio over its goal]({picture})", ""]
     for section in sections:
         lines += [f"## {section.title}", "", "| what | ours | rival | rival takes | ratio | goal | reached |"]
         lines.append("|---|--:|---|--:|--:|--:|---|")

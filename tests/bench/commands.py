@@ -1,0 +1,92 @@
+"""Commands as a person runs them, start-up included: whole processes against the times that they should take."""
+
+from __future__ import annotations
+
+import os
+import statistics
+import tempfile
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from ferryid.batch.kept import key_of, read_row, write_row
+from ferryid.batch.log_result import LogFile
+from ferryid.simulate import load_scenario, simulate, write_log
+from tests.bench.page import Row, Section, duration
+from tests.bench.processes import whole_process
+
+FIT = ("--vessel", "milliampere", "--delta", "0.4", "--sigma", "0.4")
+SHORT = Path(__file__).resolve().parents[2] / "fixtures" / "short.mcap"
+ROUND = """
+schema = "ferryid.scenario/1"
+title = "One round of the 12-corner path"
+vessel = "milliampere"
+duration_s = 720
+
+[path]
+kind = "twelve-corner"
+"""
+
+
+def run(quick: bool) -> Section:
+    """Measure; `quick` fewer times, and a batch of a hundred logs."""
+    repeats, logs = (2, 100) if quick else (5, 1000)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        trial, scenario = folder / "trial.mcap", folder / "round.toml"
+        write_log(simulate(load_scenario("twelve-corner"), 12), trial)
+        scenario.write_text(ROUND, encoding="utf-8")
+        log = ("--log", str(folder / "round.mcap"), "--overwrite")
+        rows = [
+            _row("ferryid fit, 24 min, with its report", _fits(folder, trial, (), repeats), 1.5),
+            _row("ferryid fit --no-report, 24 min", _fits(folder, trial, ("--no-report",), repeats), 0.8),
+            _row("ferryid simulate, 12 min", _times([("simulate", str(scenario), *log)] * (repeats + 1))[1:], 1.0),
+            _row(f"ferryid batch, {logs} logs and nothing to do", _resumed(folder / "batch", logs, repeats), 5.0),
+        ]
+    notes = (
+        "The log of a fit is read each time; what numba compiles is kept from the first run. The logs of the batch are links "
+        "to one file, whose result is kept for each of them under its own name and hash.",
+    )
+    return Section("Commands", rows, notes, ("numba", "matplotlib", "typer"))
+
+
+def _fits(folder: Path, trial: Path, more: Sequence[str], repeats: int) -> list[float]:
+    outs = [("--out", str(folder / f"fit{number}{len(more)}")) for number in range(repeats)]
+    return _times([("fit", str(trial), *FIT, *more, *out) for out in outs])
+
+
+def _resumed(folder: Path, logs: int, repeats: int) -> list[float]:
+    """Return the times of a batch all of whose logs are done [s]."""
+    folder.mkdir()
+    recipe, out = folder / "recipe.toml", folder / "out"
+    recipe.write_text('steps = ["fit"]\n[fit]\naccept = "thesis"\n', encoding="utf-8")
+    paths = [folder / f"log{number:04d}.mcap" for number in range(logs)]
+    os.link(SHORT, paths[0]) if os.stat(SHORT).st_dev == os.stat(folder).st_dev else paths[0].write_bytes(
+        SHORT.read_bytes()
+    )
+    words = ("batch", str(folder / "*.mcap"), "--vessel", "milliampere", "--recipe", str(recipe), "--out", str(out))
+    whole_process(words)
+    (first,) = (out / "batch" / "results").iterdir()
+    row = read_row(first)
+    assert row is not None
+    for number, path in enumerate(paths[1:], start=1):
+        os.link(paths[0], path)
+        state = path.stat()
+        files = (LogFile(str(path), state.st_size, state.st_mtime_ns),)
+        place = first.with_name(f"{path.stem}-{key_of([path], row.stamp)}")
+        place.mkdir()
+        write_row(place, replace(row, name=path.stem, files=files, sha256=f"{number:064x}"))
+    return _times([words] * repeats)
+
+
+def _times(commands: Sequence[Sequence[str]]) -> list[float]:
+    return [whole_process(words)[0] for words in commands]
+
+
+def _row(what: str, took: Sequence[float], goal_s: float) -> Row:
+    """Row of a command and the time that it should take at most."""
+    middle = statistics.median(took)
+    ratio = middle / goal_s
+    return Row(
+        f"{what}, whole process", duration(middle), "the time it may take", duration(goal_s), ratio, "≤ 1", ratio <= 1.0
+    )
