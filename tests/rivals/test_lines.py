@@ -8,6 +8,7 @@ import numpy as np
 
 from tests.rivals.__main__ import run
 from tests.rivals.lines import Lines, packed, packed_scores, unpacked, unpacked_scores
+from tests.rivals.page import OURS, damping_notes
 from tests.rivals.scores import Score
 from tests.rivals.simulated import Found
 
@@ -51,3 +52,15 @@ def test_findings_and_scores_come_back(tmp_path: Path) -> None:
     assert again.windows.shape == (0, 3)
     assert again.failed == score.failed
     assert again.diverged == 1
+
+
+def test_the_page_says_where_the_damping_misses_and_what_is_to_be_expected() -> None:
+    def trial(damping: float, expected: float) -> dict[str, Found | str]:
+        return {OURS: Found(np.zeros(3), damping, np.ones(3), np.zeros((1, 3, 4)), 1.0, expected)}
+
+    found = {"met": [trial(0.04, 0.03)], "limit": [trial(0.07, 0.06)], "worse": [trial(0.09, 0.02)]}
+    text = "\n".join(damping_notes(found))
+    assert "met" not in text
+    assert "- limit: damping 7.0 %, expected 6.0 %: the windows, terms and prior do not say more." in text
+    assert "- worse: damping 9.0 %, expected 2.0 %: more than is to be expected." in text
+    assert damping_notes({"met": found["met"]}) == []
