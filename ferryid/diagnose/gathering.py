@@ -98,7 +98,8 @@ def with_common_sensors(logs: Sequence[AveragedLog]) -> tuple[AveragedLog, ...]:
     again = {path for path, _ in repeated(logs)}
     copies = [one.path in again or one.path in {each.path for each in logs[:k]} for k, one in enumerate(logs)]
     screened = screen_together([one.screened for one in logs], copies)
-    return tuple(log if one is log.screened else average(one) for log, one in zip(logs, screened, strict=True))
+    pairs = zip(logs, screened, strict=True)
+    return tuple(over(lambda pair: pair[0] if pair[1] is pair[0].screened else average(pair[1]), pairs))
 
 
 def sort_out(logs: Sequence[AveragedLog], whose: str) -> tuple[list[AveragedLog], list[str]]:
