@@ -1,7 +1,8 @@
 """``make real``: fits and diagnoses of the recordings, written to reports/real.md and reports/real.
 
-``python -m tests.real fits`` or ``diagnoses`` makes one of the two, and ``osaka`` or ``milliampere`` one section of the
-diagnoses. ``campaign`` (``make campaign``) writes reports/campaign.md. Where the recordings are absent nothing is written.
+``python -m tests.real fits`` or ``diagnoses`` makes one of the two, and ``osaka``, ``milliampere`` or ``gunnerus`` one section
+of the diagnoses. ``campaign`` (``make campaign``) writes reports/campaign.md. Where the recordings are absent nothing is
+written.
 """
 
 from __future__ import annotations
