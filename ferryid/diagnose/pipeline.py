@@ -133,10 +133,10 @@ def _groups(
     if references.logs:
         references = without_logs(references, gathered.logs)
     run.progress("comparing the sensors of the logs")
-    logs = with_common_sensors([*gathered.logs, *references.logs])
+    screened = with_common_sensors([*gathered.logs, *references.logs])
     gathered, references = (
         replace(one, logs=some)
-        for one, some in ((gathered, logs[: len(gathered.logs)]), (references, logs[len(gathered.logs) :]))
+        for one, some in ((gathered, screened[: len(gathered.logs)]), (references, screened[len(gathered.logs) :]))
     )
     run.progress("comparing the hulls of the logs")
     return part(gathered, references, profile, settings.model)
