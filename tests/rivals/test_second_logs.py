@@ -34,13 +34,14 @@ def test_a_run_that_diverges_and_a_model_that_is_not_there_count_as_infinite() -
 
 
 def test_aims_compare_with_rivals_and_the_best_with_all() -> None:
-    force, free_run, ratio = targets(FOUND)
+    force, free_run, ratio = targets(4 * FOUND)
     # 0.52 is within 5 % of 0.5; 0.9 of 0.3 is not.
-    assert "| no | 67 % of 3 logs |" in force
+    assert "| no | 67 % of 12 logs |" in force
     # fit is better in the first log, and beaten by nobody in the second; stepwise wins the third.
-    assert "| no | 33 % of 3 logs |" in free_run
+    assert "| no | 33 % of 12 logs |" in free_run
     # 1.0 / 2.0, no rival that did not diverge, 3.0 / 2.0.
     assert "| yes | median 0.50 |" in ratio
+    assert all("| too few logs |" in row for row in targets(FOUND))
 
 
 def test_the_table_has_every_model() -> None:
