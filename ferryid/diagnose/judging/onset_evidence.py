@@ -20,7 +20,7 @@ from ferryid.effects import effects
 def sets_in(problem: EstimationProblem, kept: Fit, index: int) -> bool:
     """Return whether a candidate of a fit sets in or ends as an event that no hull, however far off, explains.
 
-    It must act, and not act, for as long as a fit is judged on. Its evidence must be `INFERENCE.contrast` times that of any
+    It must not be there for as long as a fit is judged on. Its evidence must be `INFERENCE.contrast` times that of any
     effect, and that which any other span of the same effect adds beside it: a hull that is off in some manoeuvres asks for more
     than one. It must exceed by the odds of an effect that of the same effect all along, and that of a damping that changed
     then, as over a bank or with something caught on the hull.
@@ -28,10 +28,9 @@ def sets_in(problem: EstimationProblem, kept: Fit, index: int) -> bool:
     candidate = kept.candidates[index]
     if not candidate.times or candidate.effect.passing or is_brief(problem, candidate):
         return False
-    # What it is compared with must have been seen for as long.
+    # What it is compared with must have been seen for as long as a fit is judged on.
     whole = replace(candidate, onset_s=0.0, offset_s=inf)
-    least = INFERENCE.span_blocks * block_s(problem.windows)
-    if lasts_s(problem, whole) - lasts_s(problem, candidate) < least:
+    if lasts_s(problem, whole) - lasts_s(problem, candidate) < block_s(problem.windows):
         return False
     own = kept.evidence - without(problem, kept, index).evidence
     if own < INFERENCE.contrast * INFERENCE.prior_odds:
