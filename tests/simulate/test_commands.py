@@ -78,7 +78,7 @@ def test_a_truth_that_fails_leaves_no_log_either(folder: Path, monkeypatch: pyte
     def failing(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("ferryid.simulate.logs.pq.write_table", failing)
+    monkeypatch.setattr("pyarrow.parquet.write_table", failing)
     before = sorted(folder.iterdir())
     with pytest.raises(FerryIdError, match="truth: the disk is full"):
         run(folder, truth=folder / "truth")
