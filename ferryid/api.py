@@ -268,7 +268,7 @@ def fit(
     command
         The words that the page says it was asked for with.
     report
-        Write the page; without it the model alone is stored, in a third of the time.
+        Write the page; without it the model alone is stored.
     verify
         Read whole files and check every checksum.
     announce
