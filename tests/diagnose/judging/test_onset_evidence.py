@@ -24,28 +24,30 @@ vessel = "milliampere"
 path = {{ kind = "twelve-corner" }}
 controller = {{ delta = 0.7, sigma = 0.7 }}
 sensors = {{ imu_rate_hz = 0.0, camera_rate_hz = 0.0 }}
-{fault}
+{wrong}
 """
 FAULT = '[thrusters]\nfaults = [{{ thruster = "thruster2", factor = {factor}, from_s = {onset} }}]\n'
 BEGAN_S = 400.0
 GAIN = Candidate.of(effects()["thruster_gain"], "thruster2", FERRY)
 
 
-def of_unknown_hull(folder: Path, factor: float, onset_s: float) -> EstimationProblem:
-    """Return a trial with a weak thruster, for one who knows no hull but its mass."""
-    seen = windows(
-        sailed(folder, f"weak-{factor}", SCENARIO.format(fault=FAULT.format(factor=factor, onset=onset_s)), 5),
-        *window_lengths(FERRY),
-    )
+def of_unknown_hull(folder: Path, name: str, wrong: str) -> EstimationProblem:
+    """Return a trial in which something is wrong, for one who knows no hull but its mass."""
+    seen = windows(sailed(folder, name, SCENARIO.format(wrong=wrong), 5), *window_lengths(FERRY))
     hull, rigid = FERRY.hull, np.zeros(len(COEFFICIENTS))
     rigid[:5] = hull.mass_kg, hull.mass_kg, hull.mass_kg * hull.x_g_m, hull.mass_kg * hull.x_g_m, hull.inertia_z
     plain = replace(prior_force_model(seen.measurements, FERRY)[0], hull=rigid)
     return estimation_problem(seen, plain, default_hull_spread(FERRY, seen.measurements.nu))
 
 
+def weak(folder: Path, factor: float, onset_s: float) -> EstimationProblem:
+    """Return a trial with a weak thruster."""
+    return of_unknown_hull(folder, f"weak-{factor}-{onset_s:g}", FAULT.format(factor=factor, onset=onset_s))
+
+
 @pytest.mark.slow
 def test_a_loss_that_sets_in_is_known_beside_an_unknown_hull(tmp_path: Path) -> None:
-    case = of_unknown_hull(tmp_path, 0.6, BEGAN_S)
+    case = weak(tmp_path, 0.6, BEGAN_S)
     made = fit(case, [replace(GAIN, onset_s=BEGAN_S)])
     assert made.values[0][0] == pytest.approx(0.6, abs=0.05)
     assert sets_in(case, made, 0)
@@ -56,11 +58,30 @@ def test_a_loss_that_sets_in_is_known_beside_an_unknown_hull(tmp_path: Path) -> 
 
 @pytest.mark.slow
 def test_a_loss_all_along_or_a_small_one_is_not(tmp_path: Path) -> None:
-    case = of_unknown_hull(tmp_path, 0.6, 0.0)
+    case = weak(tmp_path, 0.6, 0.0)
     assert not sets_in(case, fit(case, [GAIN]), 0)
     assert not sets_in(case, fit(case, [replace(GAIN, onset_s=60.0)]), 0)
     # A weakness that lacks the last seconds is one all along.
     last_s = float(case.steps.middle_s[-1])
     assert not sets_in(case, fit(case, [replace(GAIN, offset_s=last_s - 20.0)]), 0)
-    small = of_unknown_hull(tmp_path, 0.97, BEGAN_S)
+    small = weak(tmp_path, 0.97, BEGAN_S)
     assert not sets_in(small, fit(small, [replace(GAIN, onset_s=BEGAN_S)]), 0)
+
+
+@pytest.mark.slow
+def test_what_was_before_must_be_seen_for_as_long_as_is_held_out(tmp_path: Path) -> None:
+    began_s = 25.0
+    case = weak(tmp_path, 0.6, began_s)
+    made = fit(case, [replace(GAIN, onset_s=began_s)])
+    assert made.values[0][0] == pytest.approx(0.6, abs=0.05)
+    assert not sets_in(case, made, 0)
+
+
+@pytest.mark.slow
+def test_a_force_all_along_that_lacks_the_first_minute_does_not_set_in(tmp_path: Path) -> None:
+    line = "[environment.mooring]\nstiffness_north_Npm = 10.0\nstiffness_east_Npm = 10.0\n"
+    case = of_unknown_hull(tmp_path, "moored", line)
+    mooring = Candidate.of(effects()["mooring"], None, FERRY)
+    made = fit(case, [replace(mooring, onset_s=60.0)])
+    assert made.values[0][:2] == pytest.approx([10.0, 10.0], abs=4.0)
+    assert not sets_in(case, made, 0)
