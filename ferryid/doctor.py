@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import ferryid
-from ferryid.compiled import CacheState, cache_state
+from ferryid.compiler import CacheState, cache_state
 from ferryid.counts import counted
 
 SCHEMA = "ferryid.doctor/1"

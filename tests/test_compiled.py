@@ -7,6 +7,7 @@ import importlib.util
 import os
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -75,6 +76,28 @@ def test_a_full_disk_only_costs_the_time_to_compile(fresh: Any, monkeypatch: pyt
     monkeypatch.setattr("numba.core.caching.IndexDataCacheFile._open_for_write", full)
     assert _hits(fresh()) == 0
     assert _hits(fresh()) == 0
+
+
+def test_numba_is_loaded_at_the_first_call(tmp_path: Path) -> None:
+    program = (
+        "import pickle, sys; from ferryid.recursive_filter import _filtered, recursive_filter; import ferryid.effects\n"
+        "assert pickle.loads(pickle.dumps(_filtered)) is _filtered and _filtered.__doc__ is None\n"
+        "before = {'numba', 'llvmlite'} & set(sys.modules)\n"
+        "import numpy as np; recursive_filter(np.ones(1), np.ones(1), np.zeros(3))\n"
+        "print(sorted(before), 'numba' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert done.stdout.split() == ["[]", "True"], done.stderr
+
+
+def test_threads_that_call_a_function_first_share_what_is_compiled() -> None:
+    @compiled
+    def thrice(x: float) -> float:
+        return 3.0 * x
+
+    with ThreadPoolExecutor(8) as pool:
+        made = set(pool.map(lambda _: id(thrice._dispatcher), range(64)))  # type: ignore[attr-defined]
+    assert len(made) == 1
 
 
 CALLER = """

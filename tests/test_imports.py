@@ -10,16 +10,17 @@ from pathlib import Path
 import pytest
 
 HEAVY = (
-    "aiohttp", "apsw", "distributed", "google.protobuf", "jinja2", "matplotlib", "mcap", "numba", "pandas", "pyarrow",
-    "pyarrow.dataset", "pydantic", "rich", "rosbags", "rosbags.highlevel", "rosbags.rosbag2", "ruamel", "scipy",
-    "scipy.cluster", "scipy.optimize", "scipy.signal", "scipy.spatial", "scipy.special", "scipy.stats", "sqlite3",
+    "aiohttp", "apsw", "distributed", "google.protobuf", "jinja2", "llvmlite", "matplotlib", "mcap", "numba", "pandas",
+    "pyarrow", "pyarrow.dataset", "pydantic", "rich", "rosbags", "rosbags.highlevel", "rosbags.rosbag2", "ruamel",
+    "scipy", "scipy.cluster", "scipy.optimize", "scipy.signal", "scipy.spatial", "scipy.special", "scipy.stats", "sqlite3",
 )  # fmt: skip
 """What takes more than some hundredths of a second to load."""
 READS = {"mcap", "rosbags"}
 KEEPS = {"pyarrow"}
-MODELS = {"numba", "scipy"}
+LOOPS = {"llvmlite", "numba", "scipy"}
 """numba loads what it has compiled, and looks for scipy."""
-ESTIMATES = {*MODELS, "scipy.special", "scipy.optimize", "scipy.spatial"}
+ESTIMATES = {"scipy", "scipy.special", "scipy.optimize", "scipy.spatial"}
+PAGES = {"matplotlib", "jinja2"}
 LOG = "fixtures/short.mcap"
 VESSEL = ("--vessel", "milliampere")
 COMMANDS: dict[str, tuple[tuple[str, ...], set[str]]] = {
@@ -27,11 +28,16 @@ COMMANDS: dict[str, tuple[tuple[str, ...], set[str]]] = {
     "ingest": (("ingest", LOG, *VESSEL), READS | KEEPS),
     "ingest again": (("ingest", LOG, *VESSEL), KEEPS),
     "fit": (("fit", LOG, *VESSEL, "--accept", "thesis", "--no-report"), ESTIMATES | KEEPS),
-    "fit with its page": (("fit", LOG, *VESSEL, "--accept", "thesis"), ESTIMATES | KEEPS | {"matplotlib", "jinja2"}),
+    "fit with its page": (
+        ("fit", LOG, *VESSEL, "--accept", "thesis", "--components", "3"),
+        ESTIMATES | KEEPS | PAGES,
+    ),
     "evaluate": (("evaluate", "milliampere@1", LOG), ESTIMATES | KEEPS),
-    "models": (("models",), MODELS),
-    "export": (("export", "milliampere@1", "--to", "python"), MODELS | {"scipy.special"}),
-    "simulate": (("simulate", "four-corner"), MODELS | READS),
+    "compare": (("compare", "milliampere@1", "milliampere@2", "--on", LOG), ESTIMATES | KEEPS | PAGES),
+    "sweep": (("sweep", "components", LOG, *VESSEL), ESTIMATES | KEEPS | PAGES),
+    "models": (("models",), set()),
+    "export": (("export", "milliampere@1", "--to", "python"), {"scipy.special"}),
+    "simulate": (("simulate", "four-corner"), LOOPS | READS),
     "vessel list": (("vessel", "list"), set()),
     "vessel check": (("vessel", "check", "milliampere"), set()),
 }
@@ -54,7 +60,7 @@ def test_a_command_loads_what_it_needs(tmp_path: Path) -> None:
     for name, (words, needed) in COMMANDS.items():
         out = () if words[0] == "vessel" or words[0] == "inspect" else ("--out", str(tmp_path))
         run = subprocess.run([sys.executable, "-c", PROGRAM, *words, *out], capture_output=True, text=True, check=False)
-        assert run.returncode == 0, run.stderr
+        assert run.returncode == 0, (name, run.stdout, run.stderr)
         loaded = set(json.loads(run.stderr.splitlines()[-1]))
         if more := loaded & set(HEAVY) - needed:
             too_much[name] = sorted(more)

@@ -18,6 +18,7 @@ ORDER = (
     "counts",
     "files",
     "interrupts",
+    "compiler",
     "compiled",
     "lazy",
     "types",

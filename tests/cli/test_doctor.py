@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from ferryid import api, doctor
-from ferryid.compiled import cache_state
+from ferryid.compiler import cache_state
 from ferryid.recursive_filter import _filtered, recursive_filter
 from tests.cli.test_every_command import conforms
 

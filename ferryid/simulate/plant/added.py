@@ -9,7 +9,7 @@ import numpy as np
 
 from ferryid.compiled import borrowing
 from ferryid.effects import effects
-from ferryid.effects.simulated import address_of, call_load, call_thrust, load_address, thrust_address
+from ferryid.effects.native import address_of, call_load, call_thrust, load_address, thrust_address
 from ferryid.simulate.added_effects import AddedEffect
 from ferryid.simulate.plant.hull import Force
 from ferryid.types import Floats, Ints
