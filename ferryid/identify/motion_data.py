@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from ferryid.identify.outcome import Excitation, LogFit
 from ferryid.identify.prediction_windows import PredictionWindows
 from ferryid.identify.rows import basis_for, grids, known_rows, rows_of
 from ferryid.identify.settings import FitSettings, check_components
+from ferryid.identify.shared_rows import SharedRows
 from ferryid.identify.split import Split
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.models import ModelScores, force_scores
@@ -163,10 +164,13 @@ class LogData(MotionData):
         What the base model leaves of the measured force, shape (n, 3) each: the validation's residual.
     prepared
         The logs.
+    shared
+        Rows of the logs that folds and windows of several lengths have in common.
     """
 
     errors: tuple[Floats, ...]
     prepared: tuple[Prepared, ...]
+    shared: SharedRows = field(default_factory=SharedRows, kw_only=True)
 
     @cached_property
     def validation(self) -> QrFactor | CrossProducts:
@@ -176,7 +180,9 @@ class LogData(MotionData):
     @cached_property
     def windows(self) -> PredictionWindows:
         """Windows in which models are judged."""
-        return PredictionWindows(self.profile, self.settings, self.functions, self.motions, self.split)
+        return PredictionWindows(
+            self.profile, self.settings, self.functions, self.motions, self.split, shared=self.shared
+        )
 
     def scores(self, found: Coefficients, logs: Sequence[LogFit]) -> ModelScores:
         """Return force errors for the thesis's estimator alone, and otherwise prediction errors in windows."""

@@ -17,12 +17,12 @@ import numpy as np
 from ferryid.identify.fit_data import Coefficients
 from ferryid.identify.inertia import without_sway_coupling
 from ferryid.identify.settings import FitSettings
+from ferryid.identify.shared_rows import SharedRows
 from ferryid.identify.split import Split
 from ferryid.identify.weak_rows import WeakRows, average_over_windows
 from ferryid.models import ForceScores, ModelScores, force_scores
 from ferryid.models.forces import effective_mass
 from ferryid.regression.bases import Basis
-from ferryid.signals.complementary_filter import complementary_filter
 from ferryid.signals.track import Motion
 from ferryid.types import Flags, Floats
 from ferryid.vessel.dimensions import window_seconds
@@ -41,6 +41,8 @@ class PredictionWindows:
         The logs, and which of their rows train and validate.
     training_s
         Length of the training windows [s]; None: that of the others, in which models are judged.
+    shared
+        What folds and windows of other lengths have in common with these.
     """
 
     profile: Profile
@@ -49,6 +51,7 @@ class PredictionWindows:
     motions: tuple[Motion, ...]
     split: Split
     training_s: float | None = field(default=None, kw_only=True)
+    shared: SharedRows = field(default_factory=SharedRows, kw_only=True)
 
     @cached_property
     def length_s(self) -> float:
@@ -63,12 +66,12 @@ class PredictionWindows:
     @cached_property
     def training(self) -> tuple[WeakRows, ...]:
         """Windows within training rows, one a log."""
-        return self._averaged(self.split.training, self.velocities, self.training_length_s)
+        return self._chosen[1]
 
     @cached_property
     def validation(self) -> tuple[WeakRows, ...]:
         """Windows within validation rows, one a log."""
-        return self._averaged(self.split.validation, self.velocities, self.length_s)
+        return self._averaged(self.split.validation, self.length_s, steadied=self._chosen[0])
 
     @cached_property
     def judged(self) -> tuple[WeakRows, ...]:
@@ -77,15 +80,21 @@ class PredictionWindows:
             return self.validation
         if self.training_length_s == self.length_s:
             return self.training
-        return self._averaged(self.split.training, self.velocities, self.length_s)
+        return self._averaged(self.split.training, self.length_s, steadied=self._chosen[0])
 
-    def _averaged(self, masks: Sequence[Flags], velocities: Sequence[Floats], length_s: float) -> tuple[WeakRows, ...]:
-        return tuple(
-            average_over_windows(motion, mask, self.profile, self.settings.scale, self.functions, length_s, velocity)
-            for motion, mask, velocity in zip(self.motions, masks, velocities, strict=True)
-        )
+    def _averaged(self, masks: Sequence[Flags], length_s: float, *, steadied: bool) -> tuple[WeakRows, ...]:
+        every = []
+        for motion, mask in zip(self.motions, masks, strict=True):
+            velocity = self.shared.velocity(motion, steadied=steadied)
+            columns = self.shared.columns(motion, self.profile, self.settings.scale, self.functions, steadied=steadied)
+            every.append(
+                average_over_windows(
+                    motion, mask, self.profile, self.settings.scale, self.functions, length_s, velocity, columns
+                )
+            )
+        return tuple(every)
 
-    @cached_property
+    @property
     def velocities(self) -> tuple[Floats, ...]:
         """Velocities that enter products, shape (n, 3) each: measured, or with slow errors replaced by the position's.
 
@@ -94,13 +103,18 @@ class PredictionWindows:
         Noise of a velocity that lasts for seconds, multiplied into damping and Coriolis forces, biases their coefficients
         towards zero (errors in variables). Whichever leaves less of the training windows to a regression has less of it.
         """
-        measured = tuple(motion.nu for motion in self.motions)
-        if self.settings.reduced or not any(mask.any() for mask in self.split.training):
-            return measured
-        steadied = tuple(complementary_filter(m.nu, m.nu, m.eta, m.rate_hz) for m in self.motions)
+        return tuple(self.shared.velocity(motion, steadied=self._chosen[0]) for motion in self.motions)
+
+    @cached_property
+    def _chosen(self) -> tuple[bool, tuple[WeakRows, ...]]:
+        """Whether slow errors of the velocities are replaced, and the training windows."""
         length_s = self.training_length_s
-        left = [self._left(self._averaged(self.split.training, each, length_s)) for each in (measured, steadied)]
-        return steadied if left[1] < left[0] else measured
+        measured = self._averaged(self.split.training, length_s, steadied=False)
+        if self.settings.reduced or not any(mask.any() for mask in self.split.training):
+            return False, measured
+        steadied = self._averaged(self.split.training, length_s, steadied=True)
+        better = self._left(steadied) < self._left(measured)
+        return better, steadied if better else measured
 
     def _left(self, windows: Sequence[WeakRows]) -> float:
         """Return what least squares leave of the windows' force, as the sum of the logarithms over the axes."""

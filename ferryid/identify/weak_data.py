@@ -91,7 +91,13 @@ class WeakData(LogData):
     def windows(self) -> PredictionWindows:
         """Windows in which models are fitted and judged."""
         return PredictionWindows(
-            self.profile, self.settings, self.functions, self.motions, self.split, training_s=self.training_s
+            self.profile,
+            self.settings,
+            self.functions,
+            self.motions,
+            self.split,
+            training_s=self.training_s,
+            shared=self.shared,
         )
 
     def model_settings(self, estimate: Estimate) -> dict[str, Any]:
@@ -465,7 +471,7 @@ class WeakData(LogData):
             reduced=self.settings.reduced,
         )
 
-    @property
+    @cached_property
     def information(self) -> Floats:
         """Return the second derivative of half the squared error over the gains, shape (3, K, K)."""
         Sxx = CrossProducts.of(*self.whitened.rows).centred()[0]

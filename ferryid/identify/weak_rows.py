@@ -109,6 +109,7 @@ def average_over_windows(
     functions: Basis,
     length_s: float,
     velocity: Floats | None = None,
+    columns: Mapping[str, Floats] | None = None,
 ) -> WeakRows:
     """Average the equations of motion over windows that lie wholly within marked rows.
 
@@ -124,6 +125,8 @@ def average_over_windows(
         Length of a window [s].
     velocity
         Velocity that enters products, shape (n, 3); the measured one where it is None.
+    columns
+        What `row_columns` returns of these, where it is known already.
     """
     step_s = 1.0 / motion.rate_hz
     m = window_rows(length_s, motion.rate_hz)
@@ -136,16 +139,8 @@ def average_over_windows(
     start, run = np.concatenate(starts), np.concatenate(runs)
 
     nu = motion.nu if velocity is None else velocity
-    still = replace(motion, nu=nu, nu_dot=np.zeros_like(nu))
-    heading = motion.eta[:, 2]
-    columns = {
-        "steady": base_force(profile, still, scale),
-        "bare": base_force(profile, without_inputs(still), scale),
-        "force": motion.tau,
-        "functions": functions.of(still),
-        "heading": np.column_stack([np.cos(heading), np.sin(heading)]),
-    }
-    means = {name: _sums(np.nan_to_num(values), weight, start) for name, values in columns.items()}
+    columns = row_columns(motion, profile, scale, functions, nu) if columns is None else columns
+    means = {name: _sums(values, weight, start) for name, values in columns.items()}
     mass = profile.hull.M * scale.get("delta", 1.0)
     inertia = np.broadcast_to(mass, (len(start), 3, 3))
     if motion.payload is not None:
@@ -162,6 +157,22 @@ def average_over_windows(
         run=run,
         start=start,
     )
+
+
+def row_columns(
+    motion: Motion, profile: Profile, scale: Mapping[str, float], functions: Basis, velocity: Floats
+) -> dict[str, Floats]:
+    """Return what is averaged over windows in every row, whatever their length; arguments as of `average_over_windows`."""
+    still = replace(motion, nu=velocity, nu_dot=np.zeros_like(velocity))
+    heading = motion.eta[:, 2]
+    columns = {
+        "steady": base_force(profile, still, scale),
+        "bare": base_force(profile, without_inputs(still), scale),
+        "force": motion.tau,
+        "functions": functions.of(still),
+        "heading": np.column_stack([np.cos(heading), np.sin(heading)]),
+    }
+    return {name: np.nan_to_num(values) for name, values in columns.items()}
 
 
 def window_rows(length_s: float, rate_hz: float) -> int:

@@ -141,6 +141,7 @@ NO_DECISION = {
     """,
     "sizes: rows held at once, draws, folds, bins, and how much is shown": """
         identify.weak_rows _CHUNK_WINDOWS
+        identify.shared_rows MOST_ROWS
         signals.kalman _LEAST_ROWS _FIT_ROWS
         signals.poses _STEPS_SAID
         signals.quality _MEDIAN_OF

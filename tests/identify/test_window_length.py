@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from ferryid.identify import shared_rows
 from ferryid.identify.feasible import LiftTie, feasible_gains
 from ferryid.identify.split import Split
 from ferryid.identify.weak_rows import to_force
 from ferryid.identify.window_length import prediction_scatter, with_best_length
 from ferryid.models.forces import effective_mass
+from ferryid.regression.bases import make_basis
+from ferryid.signals.track import Motion
 from tests.identify.rounds import PROFILE
 from tests.identify.test_weak_form import BASIS, SCALE, K, data_of
 from tests.identify.trials import measured
@@ -74,3 +78,46 @@ def test_a_turning_moment_of_surge_and_sway_goes_with_the_masses_unless_lift_is_
     assert bool(drawn.std() > 0.3) is sure
     assert theta[u_dot, 0] == pytest.approx(added[0, 0])
     assert theta[v_dot, 1] == pytest.approx(added[1, 1])
+
+
+def test_rows_are_shared_by_folds_and_lengths_and_change_no_window(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[str] = []
+    own = shared_rows.row_columns
+
+    def counted(motion: Motion, *given: Any) -> Any:
+        made.append(motion.log)
+        return own(motion, *given)
+
+    monkeypatch.setattr(shared_rows, "row_columns", counted)
+    data = data_of([measured(seed, seconds=300.0, jitter=0.05) for seed in (1, 2)])
+    rows = tuple(one.valid & (np.arange(len(one.t)) % 700 < 600) for one in data.motions)
+    others = [
+        replace(data, training_s=24.0),
+        replace(data, split=Split("folds", rows, tuple(~one for one in rows), 0.0)),
+    ]
+    found = [one.windows.training + one.windows.judged for one in (data, *others)]
+    # Measured and steadied velocities of two logs.
+    assert len(made) == 4
+    monkeypatch.setattr(shared_rows, "MOST_ROWS", 0)
+    for one, windows in zip((data, *others), found, strict=True):
+        alone = replace(one, shared=shared_rows.SharedRows()).windows
+        for kept, again in zip(windows, alone.training + alone.judged, strict=True):
+            for name in ("functions", "steady", "bare", "force", "by_pose", "start"):
+                np.testing.assert_array_equal(getattr(kept, name), getattr(again, name))
+    assert len(made) > 12
+
+
+def test_rows_of_another_scale_or_basis_are_made_anew() -> None:
+    shared, (motion,) = shared_rows.SharedRows(), data_of([measured(1, seconds=120.0)]).motions
+    one, again, heavier, other = (
+        shared.columns(motion, PROFILE, scale, basis, steadied=False)
+        for scale, basis in (
+            (SCALE, BASIS),
+            (SCALE, BASIS),
+            ({**SCALE, "sigma": 2.0 * SCALE.get("sigma", 1.0)}, BASIS),
+            (SCALE, make_basis("thesis")),
+        )
+    )
+    assert again is one
+    assert not np.array_equal(heavier["steady"], one["steady"])
+    assert other["functions"].shape != one["functions"].shape

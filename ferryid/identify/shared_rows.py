@@ -1,0 +1,50 @@
+"""What folds of the training rows and windows of several lengths have in common: the rows of the logs that they average."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ferryid.identify.weak_rows import row_columns
+from ferryid.regression.bases import Basis
+from ferryid.signals.complementary_filter import complementary_filter
+from ferryid.signals.track import Motion
+from ferryid.types import Floats
+from ferryid.vessel.profile import Profile
+
+MOST_ROWS = 250_000
+"""So many rows of all logs are kept, twice some thirty numbers each; of more, rows are made again each time."""
+
+
+class SharedRows:
+    """Rows of logs, made when they are first asked for and kept for as long as this is."""
+
+    def __init__(self) -> None:
+        # With what they were made of, so that the ids of that stay its own.
+        self._steadied: dict[int, tuple[Motion, Floats]] = {}
+        self._columns: dict[tuple[Any, ...], tuple[tuple[Any, ...], Mapping[str, Floats]]] = {}
+        self._rows: dict[int, int] = {}
+
+    def velocity(self, motion: Motion, *, steadied: bool) -> Floats:
+        """Return the velocity of a log, shape (n, 3): as measured, or with slow errors replaced by the position's."""
+        if not steadied:
+            return motion.nu
+        if id(motion) not in self._steadied:
+            found = complementary_filter(motion.nu, motion.nu, motion.eta, motion.rate_hz)
+            self._steadied[id(motion)] = motion, found
+        return self._steadied[id(motion)][1]
+
+    def columns(
+        self, motion: Motion, profile: Profile, scale: Mapping[str, float], functions: Basis, *, steadied: bool
+    ) -> Mapping[str, Floats]:
+        """Return `row_columns` of a log."""
+        made_of = motion, profile, functions
+        key = *(id(one) for one in made_of), steadied, *sorted(scale.items())
+        if key in self._columns:
+            return self._columns[key][1]
+        found = row_columns(motion, profile, scale, functions, self.velocity(motion, steadied=steadied))
+        rows = {**self._rows, id(motion): len(motion.t)}
+        if sum(rows.values()) <= MOST_ROWS:
+            self._rows = rows
+            self._columns[key] = made_of, found
+        return found
