@@ -26,11 +26,11 @@ class PlainValues:
         """Return the options and arguments, that for the help included."""
         params: list[Any] = super().get_params(ctx)  # type: ignore[misc]
         for param in params:
-            # Versions of typer without pydantic have no such method.
+            # Other versions of typer may have no such method; theirs is what happens then.
             own = getattr(param, "get_runtime_param", None)
-            make = None if own is None else _maker(param.type_descriptor)
+            make = None if own is None else _maker(param)
             if make is not None and not isinstance(getattr(own, "__self__", None), _Coercion):
-                param.get_runtime_param = _Coercion(make, own).itself
+                param.get_runtime_param = _Coercion(make, own, param).itself
         return params
 
 
@@ -45,31 +45,38 @@ class PlainGroup(PlainValues, TyperGroup):
 class _Coercion:
     """What typer asks for a value, in the place of its own."""
 
-    def __init__(self, make: Callable[[Any], Any], own: Callable[[], Any]) -> None:
-        self._make, self._own = make, own
+    def __init__(self, make: Callable[[Any], Any], own: Callable[[], Any], param: Any) -> None:
+        self._make, self._own, self._param = make, own, param
+
+    def __getattr__(self, name: str) -> Any:
+        """Return what else typer asks its own for."""
+        return getattr(self._own(), name)
 
     def itself(self) -> _Coercion:
         return self
 
-    def coerce(self, value: Any, param: Any, ctx: Any) -> Any:
+    def coerce(self, value: Any, *given: Any, **named: Any) -> Any:
         """Return the value of a word, or of several."""
         if value is None:
-            return () if param.multiple or param.nargs == -1 else None
+            return () if self._param.multiple or self._param.nargs == -1 else None
         try:
             return self._make(value)
         except ValueError:
-            return self._own().coerce(value, param=param, ctx=ctx)
+            return self._own().coerce(value, *given, **named)
 
 
-def _maker(descriptor: Any) -> Callable[[Any], Any] | None:
-    """Return what makes values of an annotation, None where typer has to."""
-    info = descriptor.parameter_info
-    if info.parser is not None or info.min is not None or info.max is not None:
+def _maker(param: Any) -> Callable[[Any], Any] | None:
+    """Return what makes values of a parameter, None where typer has to."""
+    try:
+        kind, info = param.type_descriptor.annotation, param.type_descriptor.parameter_info
+        if info.parser is not None or info.min is not None or info.max is not None:
+            return None
+        if kind is Path:
+            stated = info.exists or info.writable or info.resolve_path or info.allow_dash or info.path_type is not None
+            return None if stated or not (info.file_okay and info.dir_okay) else _path
+    except AttributeError:
+        # Another version of typer, which keeps what is asked of a value elsewhere.
         return None
-    kind = descriptor.annotation
-    if kind is Path:
-        stated = info.exists or info.writable or info.resolve_path or info.allow_dash or info.path_type is not None
-        return None if stated or not (info.file_okay and info.dir_okay) else _path
     return {bool: _flag, str: _text, int: _integer, float: _number, list[str]: _texts}.get(kind)
 
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Annotated, Any
 
 import pytest
 import typer
-from typer.core import TyperCommand
+from typer.core import TyperArgument, TyperCommand, TyperOption
 
+from ferryid.cli import plain_values
 from ferryid.cli.plain_values import PlainCommand
 
 WORDS = (
@@ -50,11 +53,45 @@ def parsed(cls: type[TyperCommand], words: list[str]) -> Any:
     try:
         typer.main.get_command(app).main(words, prog_name="x", standalone_mode=False)
     except Exception as error:  # noqa: BLE001 - both must fail alike
-        return type(error), str(error)
+        return type(error), getattr(error, "format_message", error.__str__)()
     got.pop("got", None)
     return {name: (type(value), repr(value)) for name, value in got.items()}
 
 
 @pytest.mark.parametrize("words", WORDS, ids=" ".join)
 def test_values_and_errors_are_those_of_typer(words: list[str]) -> None:
+    assert parsed(PlainCommand, words) == parsed(TyperCommand, words)
+
+
+def _renamed_method(monkeypatch: pytest.MonkeyPatch) -> None:
+    mixin = next(one for one in TyperOption.__mro__ if "get_runtime_param" in vars(one))
+    own = mixin.get_runtime_param
+    monkeypatch.setattr(mixin, "checked", own, raising=False)
+    monkeypatch.delattr(mixin, "get_runtime_param")
+    monkeypatch.setattr(
+        mixin, "process_value", lambda self, ctx, value: self.checked().coerce(value, param=self, ctx=ctx)
+    )
+
+
+def _renamed_coercion(monkeypatch: pytest.MonkeyPatch) -> None:
+    mixin = next(one for one in TyperOption.__mro__ if "get_runtime_param" in vars(one))
+    kind = typer.core.RuntimeParam
+    monkeypatch.setattr(kind, "convert", kind.coerce, raising=False)
+    monkeypatch.setattr(
+        mixin, "process_value", lambda self, ctx, value: self.get_runtime_param().convert(value, param=self, ctx=ctx)
+    )
+
+
+def _renamed_description(monkeypatch: pytest.MonkeyPatch) -> None:
+    own = plain_values._maker
+    monkeypatch.setattr(plain_values, "_maker", lambda param: own(SimpleNamespace(multiple=param.multiple)))
+
+
+@pytest.mark.parametrize("change", [_renamed_method, _renamed_coercion, _renamed_description])
+@pytest.mark.parametrize("words", [WORDS[1], WORDS[6], WORDS[7]], ids=" ".join)
+def test_where_typer_is_another_one_it_makes_the_values(
+    monkeypatch: pytest.MonkeyPatch, change: Callable[[pytest.MonkeyPatch], None], words: list[str]
+) -> None:
+    change(monkeypatch)
+    assert "get_runtime_param" not in dir(TyperArgument) or change is not _renamed_method
     assert parsed(PlainCommand, words) == parsed(TyperCommand, words)
