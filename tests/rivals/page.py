@@ -115,8 +115,8 @@ def damping_notes(found: Mapping[str, Sequence[Mapping[str, Found | str]]]) -> l
         value, limit = summary([one[OURS] for one in trials])[3], expected(trials)
         if value <= MOST_DAMPING:
             continue
-        why = "the windows, terms and prior do not say more" if limit > MOST_DAMPING else "more than is to be expected"
-        lines.append(f"- {name}: damping {value:.1f} %, expected {limit:.1f} %: {why}.")
+        why = "the aim is below that" if limit > MOST_DAMPING else "more than is to be expected"
+        lines.append(f"- {name}: damping {value:.1f} %, expected by the covariance of the fit {limit:.1f} %: {why}.")
     if not lines:
         return []
     return ["", f"Where the error of the damping force is above {MOST_DAMPING:g} %:", "", *lines]

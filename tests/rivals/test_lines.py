@@ -61,6 +61,6 @@ def test_the_page_says_where_the_damping_misses_and_what_is_to_be_expected() -> 
     found = {"met": [trial(0.04, 0.03)], "limit": [trial(0.07, 0.06)], "worse": [trial(0.09, 0.02)]}
     text = "\n".join(damping_notes(found))
     assert "met" not in text
-    assert "- limit: damping 7.0 %, expected 6.0 %: the windows, terms and prior do not say more." in text
-    assert "- worse: damping 9.0 %, expected 2.0 %: more than is to be expected." in text
+    assert "- limit: damping 7.0 %, expected by the covariance of the fit 6.0 %: the aim is below that." in text
+    assert "- worse: damping 9.0 %, expected by the covariance of the fit 2.0 %: more than is to be expected." in text
     assert damping_notes({"met": found["met"]}) == []
