@@ -236,12 +236,12 @@ def test_a_full_disk(ferryid, fixtures: Path, tmp_path: Path) -> None:
 def test_an_interrupt_exits_with_130_and_leaves_nothing(
     ferryid, fixtures: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import ferryid.report.fit_report as fit_report
+    from ferryid.report import page
 
     def interrupted(*_: object) -> str:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(fit_report, "render", interrupted)
+    monkeypatch.setattr(page, "render", interrupted)
     run = ferryid("fit", fixtures / "short.mcap", "--vessel", "milliampere", "--out", tmp_path / "out")
     assert run.code == 130
     assert not list((tmp_path / "out").rglob("*.part"))
@@ -253,7 +253,7 @@ def test_an_interrupt_exits_with_130_and_leaves_nothing(
 def test_a_terminated_command_cleans_up_and_exits_with_143(
     ferryid, fixtures: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import ferryid.report.fit_report as fit_report
+    from ferryid.report import page
 
     def terminated(*_: object) -> str:
         os.kill(os.getpid(), signal.SIGTERM)
@@ -261,7 +261,7 @@ def test_a_terminated_command_cleans_up_and_exits_with_143(
 
     # Without a handler of ours the signal would end the tests.
     before = signal.signal(signal.SIGTERM, signal.SIG_IGN)
-    monkeypatch.setattr(fit_report, "render", terminated)
+    monkeypatch.setattr(page, "render", terminated)
     try:
         run = ferryid("fit", fixtures / "short.mcap", "--vessel", "milliampere", "--out", tmp_path / "out")
     finally:

@@ -156,10 +156,10 @@ def _draw_once() -> None:
     """Keep the pages and figures of fits: to draw them again takes longer than all the rest of a case."""
     from ferryid.files import dump_json
     from ferryid.models.model import model_to_json
-    from ferryid.report import fit_report
+    from ferryid.report import page
 
     kept: dict[str, Any] = {}
-    drawn = fit_report.render
+    drawn = page.render
 
     def render(result: Any, *more: Any) -> Any:
         key = dump_json(model_to_json(replace(result.model, created="")))
@@ -167,7 +167,7 @@ def _draw_once() -> None:
             kept[key] = drawn(result, *more)
         return kept[key]
 
-    fit_report.render = render
+    page.render = render
 
 
 def _child(
