@@ -73,14 +73,18 @@ def changes(
             [-st, ct * sf, ct * cf],
         ]
     )
-    dy[0:3] = R @ nu[0:3]
+    # By elements, here and below: an assignment of slices would bring in, and compile, all that makes the text of its errors.
+    over_ground = R @ nu[0:3]
+    for i in range(3):
+        dy[i] = over_ground[i]
     dy[3] = nu[3] + (nu[4] * sf + nu[5] * cf) * tan(pitch)
     dy[4] = nu[4] * cf - nu[5] * sf
     dy[5] = (nu[4] * sf + nu[5] * cf) / ct
     # Water and air as the vessel meets them; the flow is the same everywhere, so it turns against the turning vessel.
     stream = R.T @ np.array([flow[0], flow[1], 0.0])
     through = nu.copy()
-    through[0:3] -= stream
+    for i in range(3):
+        through[i] -= stream[i]
     stream_dot = np.zeros(6)
     stream_dot[0] = nu[5] * stream[1] - nu[4] * stream[2]
     stream_dot[1] = nu[3] * stream[2] - nu[5] * stream[0]
@@ -95,14 +99,17 @@ def changes(
     added = world.hull.added * (deeper * (1.0 + ADDED_MASS_SHARE * (shallow - 1.0)))
     coriolis(rigid, nu, load)
     coriolis(added, through, load)
-    load += added @ stream_dot
+    carried = added @ stream_dot
+    for i in range(6):
+        load[i] += carried[i]
     drag(world.hull, through, sunk, shallow, load)
     # Heave is counted from where the vessel floats with its load.
     restoring(world.hull, down, roll, pitch, load)
     overhead = R.T @ np.array([air[0], air[1], 0.0])
     air_load(world.air, overhead[0] - nu[0], overhead[1] - nu[1], load)
     mooring_load(world.mooring, t, north, east, R, load)
-    load += external
+    for i in range(6):
+        load[i] += external[i]
     k = len(world.thrusters.most)
     thrust(
         world.thrusters,
@@ -114,15 +121,22 @@ def changes(
         load,
         parts,
     )
-    dy[6:12] = np.linalg.solve(rigid + added, load)
+    acceleration = np.linalg.solve(rigid + added, load)
+    for i in range(6):
+        dy[6 + i] = acceleration[i]
 
 
 NODES = np.array([0.0, 0.2, 0.3, 0.8, 8.0 / 9.0, 1.0])
 A2 = 1.0 / 5.0
-A3 = np.array([3.0 / 40.0, 9.0 / 40.0])
-A4 = np.array([44.0 / 45.0, -56.0 / 15.0, 32.0 / 9.0])
-A5 = np.array([19372.0 / 6561.0, -25360.0 / 2187.0, 64448.0 / 6561.0, -212.0 / 729.0])
-A6 = np.array([9017.0 / 3168.0, -355.0 / 33.0, 46732.0 / 5247.0, 49.0 / 176.0, -5103.0 / 18656.0])
+A = np.array(
+    [
+        [3.0 / 40.0, 9.0 / 40.0, 0.0, 0.0, 0.0],
+        [44.0 / 45.0, -56.0 / 15.0, 32.0 / 9.0, 0.0, 0.0],
+        [19372.0 / 6561.0, -25360.0 / 2187.0, 64448.0 / 6561.0, -212.0 / 729.0, 0.0],
+        [9017.0 / 3168.0, -355.0 / 33.0, 46732.0 / 5247.0, 49.0 / 176.0, -5103.0 / 18656.0],
+    ]
+)
+"""Of the third stage to the sixth."""
 B = np.array([35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0])
 
 
@@ -139,21 +153,20 @@ def step(
     parts: Floats,
 ) -> None:
     """Advance the states by h [s] in place; orders, flow, air and external load are constant. `parts`: at the start."""
-    k, spare = np.zeros((6, len(y))), np.zeros_like(parts)
-    # One call in a loop: in six places it would be compiled six times.
+    k, w, spare = np.zeros((6, len(y))), np.empty_like(y), np.zeros_like(parts)
+    # One call in a loop, in six places it would be compiled six times; by elements, as each sum of arrays would be compiled.
     for stage in range(6):
-        if stage == 0:
-            w = y
-        elif stage == 1:
-            w = y + h * A2 * k[0]
-        elif stage == 2:
-            w = y + h * (A3[0] * k[0] + A3[1] * k[1])
-        elif stage == 3:
-            w = y + h * (A4[0] * k[0] + A4[1] * k[1] + A4[2] * k[2])
-        elif stage == 4:
-            w = y + h * (A5[0] * k[0] + A5[1] * k[1] + A5[2] * k[2] + A5[3] * k[3])
-        else:
-            w = y + h * (A6[0] * k[0] + A6[1] * k[1] + A6[2] * k[2] + A6[3] * k[3] + A6[4] * k[4])
+        for i in range(len(y)):
+            if stage == 0:
+                w[i] = y[i]
+            elif stage == 1:
+                w[i] = y[i] + h * A2 * k[0, i]
+            else:
+                slope = A[stage - 2, 0] * k[0, i]
+                for j in range(1, stage):
+                    slope += A[stage - 2, j] * k[j, i]
+                w[i] = y[i] + h * slope
         at_start = parts if stage == 0 else spare
         changes(world, t + NODES[stage] * h, w, order, flow, air, external, k[stage], at_start)
-    y += h * (B[0] * k[0] + B[2] * k[2] + B[3] * k[3] + B[4] * k[4] + B[5] * k[5])
+    for i in range(len(y)):
+        y[i] += h * (B[0] * k[0, i] + B[2] * k[2, i] + B[3] * k[3, i] + B[4] * k[4, i] + B[5] * k[5, i])

@@ -140,25 +140,18 @@ def simulate_trial(vessel: Vessel, conditions: Conditions, path: str, seed: int)
     shapes = ((n, 6), (n, len(start)), (n, k, 2), (n, 3), (n, 6), (n, k, 3))
     log = _Log(*(np.zeros(shape) for shape in shapes))
     loads = {name: np.zeros((n, 6)) for name in plant.loads}
+    _measure(setup, memory, log, 0)
     if plant.loads or plant.reports:
         for row in range(n):
-            _measure(setup, memory, log, row)
             for report in plant.reports:
                 report(log.reported[row])
             for name, load in plant.loads.items():
                 load((row + 0.5) / RATE_HZ, memory.y, loads[name][row])
                 log.external[row] += loads[name][row]
-            _advance(setup, memory, log, row)
+            _advance(setup, memory, log, row, row + 1)
     else:
-        _run(setup, memory, log)
+        _advance(setup, memory, log, 0, n)
     return Trial(plant, t, log.reported, log.states, log.orders, log.wanted, loads, log.thrust)
-
-
-@compiled
-def _run(setup: _Setup, memory: _Memory, log: _Log) -> None:
-    for row in range(len(log.reported)):
-        _measure(setup, memory, log, row)
-        _advance(setup, memory, log, row)
 
 
 @compiled
@@ -171,23 +164,33 @@ def _measure(setup: _Setup, memory: _Memory, log: _Log, row: int) -> None:
         acceleration[j] = (rates[j] - memory.speed[j]) / h if row > 0 else 0.0
         memory.speed[j] = rates[j]
     navigate(setup.errors, row, h, pose, rates, acceleration, memory.observer, log.reported[row])
-    log.states[row] = memory.y
+    # An assignment of slices would bring in, and compile, all that makes the text of its errors.
+    for i in range(len(memory.y)):
+        log.states[row, i] = memory.y[i]
 
 
 @compiled
-def _advance(setup: _Setup, memory: _Memory, log: _Log, row: int) -> None:
-    """Steer by what is reported, and move the vessel on to the next sample."""
+def _advance(setup: _Setup, memory: _Memory, log: _Log, first: int, stop: int) -> None:
+    """From one sample to another, steer by what is reported, move the vessel on to the next sample and measure there.
+
+    One function for a trial at a stroke and for one row at a time: two would be compiled twice, with all that they call.
+    """
     h, steps = 1.0 / RATE_HZ, setup.steps
-    if row % CONTROL_EVERY == 0:
-        goal = setup.goals[min(int(row * h / DWELL_S), len(setup.goals) - 1)]
-        seen = log.reported[max(row - setup.late, 0)]
-        steer(setup.tune, h * CONTROL_EVERY, goal, seen, memory.helm, memory.order, memory.wanted)
-    log.orders[row] = memory.order
-    log.wanted[row] = memory.wanted
-    for part in range(steps):
-        t = (row + part / steps) * h
-        water, air, external, thrust = setup.water[row], setup.air[row], log.external[row], log.thrust[row]
-        step(setup.world, t, h / steps, memory.y, memory.order, water, air, external, thrust)
+    for row in range(first, stop):
+        if row % CONTROL_EVERY == 0:
+            goal = setup.goals[min(int(row * h / DWELL_S), len(setup.goals) - 1)]
+            seen = log.reported[max(row - setup.late, 0)]
+            steer(setup.tune, h * CONTROL_EVERY, goal, seen, memory.helm, memory.order, memory.wanted)
+        for i in range(len(memory.order)):
+            log.orders[row, i, 0], log.orders[row, i, 1] = memory.order[i, 0], memory.order[i, 1]
+        for i in range(3):
+            log.wanted[row, i] = memory.wanted[i]
+        for part in range(steps):
+            t = (row + part / steps) * h
+            water, air, external, thrust = setup.water[row], setup.air[row], log.external[row], log.thrust[row]
+            step(setup.world, t, h / steps, memory.y, memory.order, water, air, external, thrust)
+        if row + 1 < len(log.reported):
+            _measure(setup, memory, log, row + 1)
 
 
 @compiled

@@ -43,7 +43,9 @@ def mooring_load(mooring: Mooring, t: float, north: float, east: float, R: Float
     if mooring.line[0] + mooring.line[1] > 0.0 and mooring.span[0] <= t < mooring.span[1]:
         dn, de = north - mooring.line[2], east - mooring.line[3]
         stiffer = 1.0 + 0.1 * (dn * dn + de * de) / STIFFENING_M**2
-        out[0:3] += R.T @ np.array([-mooring.line[0] * dn * stiffer, -mooring.line[1] * de * stiffer, 0.0])
+        pull = R.T @ np.array([-mooring.line[0] * dn * stiffer, -mooring.line[1] * de * stiffer, 0.0])
+        for i in range(3):
+            out[i] += pull[i]
 
 
 def sample(size: float, vessel: Vessel, rng: np.random.Generator, span: Span) -> Injection:

@@ -50,7 +50,9 @@ def share_aboard(load: Payload, t: float) -> float:
 def boarding_load(load: Payload, t: float, nu: Floats, out: Floats) -> None:
     """Add the momentum that a load takes from the vessel as it comes aboard at rest; one that leaves takes its own along."""
     if 0.0 < (t - load.span[0]) / BOARDING_S + 0.5 < 1.0:
-        out -= load.mass @ nu / BOARDING_S
+        momentum = load.mass @ nu
+        for i in range(6):
+            out[i] -= momentum[i] / BOARDING_S
 
 
 def sample(size: float, vessel: Vessel, rng: np.random.Generator, span: Span) -> Injection:

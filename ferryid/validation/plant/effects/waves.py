@@ -108,7 +108,8 @@ def sea_constants(rng: np.random.Generator, vessel: Vessel, conditions: Conditio
 @compiled
 def sea_load(sea: SeaConstants, t: float, north: float, east: float, psi: float, out: Floats) -> None:
     """Write the load of the waves at a place and time, shape (6,) [N, N·m]."""
-    out[:] = 0.0
+    for i in range(6):
+        out[i] = 0.0
     for i in range(len(sea.omega)):
         amplitude = sea.amplitude[i]
         if sea.width[i] > 0.0:
