@@ -30,6 +30,7 @@ NO_DECISION = {
         diagnose.second_sources.comparison NORMAL_95
         diagnose.second_sources.samples _TURN
         identify.free_run_checks _DEGREES
+        effects.wind_loads EIGHTH SIXTEENTH THREE_SIXTEENTHS TANGENT_EIGHTH
         diagnose.judging.group_loads BONFERRONI
         identify.split _GOLDEN
     """,
@@ -42,8 +43,8 @@ NO_DECISION = {
         diagnose.second_sources.pairs NORTH EAST PSI U V R
         diagnose.inference.kalman CHANNEL_STATES DIFFUSE
         effects.effect HELD
-        effects.equations_of_motion MASSES DAMPED
-        effects.force_model _NO_FLOW _NO_LOAD _NO_FACTOR
+        effects.equations_of_motion MASSES DAMPED PRODUCTS PRODUCT_OF AHEAD
+        effects.force_model _NO_FLOW _NO_LOAD _NO_FACTOR _ONE_WIND
         diagnose.inference.noise_estimation GROUPS
         regression.bases.term SURGE SWAY YAW DIMENSIONS
         regression.cross_validation.block_sums OUT
@@ -132,7 +133,7 @@ NO_DECISION = {
         effects.gusts DIFFERENCE_MPS
         effects.linear_evidence DIFFERENCE_STEP
         effects.shallow_water CELLS
-        effects.wind SPEEDS_MPS BEARINGS
+        effects.wind SPEEDS_MPS BEARINGS MEAN_WEIGHTS
         identify.feasible _ROUNDS _SHARES _DIRECTIONS _TIE_STEPS
         identify.log_conditions _DIRECTIONS _SPEEDS _STEP_MPS
         identify.settings WINDOWS_S
