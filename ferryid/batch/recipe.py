@@ -37,6 +37,8 @@ class Recipe:
         empty.
     fit
         Settings of the fit.
+    fit_report
+        Whether a fit writes its page, or stores the model alone.
     withhold
         Signals to hide from the diagnosis, and to compare afterwards.
     versus
@@ -46,6 +48,7 @@ class Recipe:
     steps: tuple[str, ...] = STEPS
     model: str = ""
     fit: FitSettings = field(default_factory=FitSettings)
+    fit_report: bool = True
     withhold: tuple[str, ...] = ()
     versus: bool = True
 
@@ -54,6 +57,9 @@ class Recipe:
         told: dict[str, Any] = {"steps": list(self.steps)}
         if "fit" in self.steps:
             told["fit"] = {one.name: getattr(self.fit, one.name) for one in self.fit.options()}
+            # Named where it is not the default, so that what was done before the key was there stands.
+            if not self.fit_report:
+                told["fit"]["report"] = False
         if "diagnose" in self.steps:
             told["diagnose"] = {"withhold": list(self.withhold)}
         return told
@@ -105,15 +111,16 @@ class _Reader:
             check_withheld(withhold)
         except FerryIdError as error:
             raise self._fault(("diagnose", "withhold"), str(error)) from error
-        versus = diagnose.get("versus", True)
-        if not isinstance(versus, bool):
-            raise self._fault(("diagnose", "versus"), f'"versus" is true or false, found {versus!r}. Fix: correct it')
+        versus = self._yes_or_no(diagnose, ("diagnose", "versus"))
+        fit = dict(self._section(data, "fit"))
+        fit_report = self._yes_or_no(fit, ("fit", "report"))
+        fit.pop("report", None)
         chosen = tuple(step for step in STEPS if step in steps)
-        return Recipe(chosen, model, self._fit(self._section(data, "fit")), tuple(withhold), versus)
+        return Recipe(chosen, model, self._fit(fit), fit_report, tuple(withhold), versus)
 
     def _fit(self, section: Mapping[str, Any]) -> FitSettings:
         kinds = {one.name: str(one.type).split(" | ") for one in FitSettings.options()}
-        self._known(section, ("fit",), tuple(kinds))
+        self._known(section, ("fit",), (*kinds, "report"))
         for name, value in section.items():
             allowed = [KINDS[kind] for kind in kinds[name] if kind in KINDS]
             types = tuple(one for _, types in allowed for one in types)
@@ -132,6 +139,12 @@ class _Reader:
         if not isinstance(section, dict):
             raise self._fault((name,), f'"{name}" is a section, found {section!r}. Fix: write [{name}] on a line')
         return section
+
+    def _yes_or_no(self, section: Mapping[str, Any], place: KeyPath) -> bool:
+        value = section.get(str(place[-1]), True)
+        if not isinstance(value, bool):
+            raise self._fault(place, f'"{place[-1]}" is true or false, found {value!r}. Fix: correct it')
+        return value
 
     def _texts(self, data: Mapping[str, Any], place: KeyPath, default: tuple[str, ...]) -> tuple[str, ...]:
         value = data.get(str(place[-1]), default)

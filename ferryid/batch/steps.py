@@ -75,7 +75,8 @@ class Job:
 
 
 def _fitted(job: Job) -> FitSummary:
-    made = fit_and_report([job.log], job.profile, job.recipe.fit, job.context, name=job.model_name())
+    page = job.recipe.fit_report
+    made = fit_and_report([job.log], job.profile, job.recipe.fit, job.context, name=job.model_name(), page=page)
     # What a fit over the whole archive adds up is made here, where logs are worked on side by side.
     if job.recorded.exists():
         settings = job.recipe.fit.on(job.profile)
@@ -86,7 +87,7 @@ def _fitted(job: Job) -> FitSummary:
     told, scores = made.json, finite(made.json["scores"])
     return FitSummary(
         model=job.below(told["model"]["path"]),
-        report=job.below(made.report),
+        report=job.below(made.report) if page else None,
         accepted=made.accepted,
         headline=told["headline"],
         warnings=tuple(told["warnings"]),

@@ -170,7 +170,7 @@ def _row(row: SummaryRow) -> TableRow:
     fit, evaluation, diagnosis = row.fit, row.evaluate, row.diagnose
     sure = [one for one in row.findings if one.probability > JUDGING.hint_probability]
     links = [
-        *([("fit", fit.report)] if fit else []),
+        *([("fit", fit.report)] if fit and fit.report else []),
         *([("diagnosis", diagnosis.report)] if diagnosis else []),
         *([("evaluation", evaluation.file)] if evaluation else []),
         *([("traceback", "traceback.txt")] if row.status == "failed" else []),

@@ -31,7 +31,7 @@ class FitSummary(Record):
     Attributes
     ----------
     model, report
-        Paths of model file and page, relative to the folder of the log's results.
+        Paths of model file and page, relative to the folder of the log's results; no page where the recipe wants none.
     accepted
         Verdict.
     headline, warnings
@@ -43,7 +43,7 @@ class FitSummary(Record):
     """
 
     model: str
-    report: str
+    report: str | None
     accepted: bool
     headline: str
     warnings: tuple[str, ...]

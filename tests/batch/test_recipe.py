@@ -50,6 +50,8 @@ def test_results_depend_on_the_settings_of_the_steps_alone(tmp_path: Path) -> No
     other = loaded(tmp_path, 'steps = ["evaluate"]\n')
     assert one.plain() == other.plain()
     assert loaded(tmp_path, "[fit]\nwindow_s = 2.0\n").plain() != Recipe().plain()
+    assert loaded(tmp_path, "[fit]\nreport = false\n").plain() != Recipe().plain()
+    assert "report" not in Recipe().plain()["fit"], "what was done before the key was there stands"
     assert loaded(tmp_path, '[diagnose]\nwithhold = ["wind"]\n').plain() != Recipe().plain()
 
 
@@ -68,6 +70,7 @@ def test_results_depend_on_the_settings_of_the_steps_alone(tmp_path: Path) -> No
         ("[fit]\nwindow_s = 99", r"1: in \[fit\], --window: 99 s is no smoothing window\."),
         ("[fit]\ndraws = 0", r"1: in \[fit\], draws: 0 is no number of draws\."),
         ('[fit]\nbasis = "modulos"', r'1: in \[fit\], .*Did you mean "modulus"'),
+        ("[fit]\nreport = 1", r'2: "report" is true or false, found 1\.'),
         ("fit = 3", r'1: "fit" is a section, found 3\.'),
         ("model = 2", r'1: "model" is text, found 2\.'),
         ('[diagnose]\nwithhold = ["wend"]', r'2: --withhold: "wend" is not .* Did you mean "wind"\?'),

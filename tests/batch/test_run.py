@@ -29,10 +29,18 @@ from ferryid.report.batch_rows import BatchResult
 from ferryid.vessel import load_profile
 from tests.batch.archive import archive, deadly, recipe, rows_of, run, same
 from tests.batch.work import children_of, default_interrupts, ended, environment
+from tests.cli.test_every_command import conforms
 
 pytestmark = pytest.mark.slow
 
-FIT = 'steps = ["fit"]\n[fit]\ndelta = 0.4\nsigma = 0.4\ndraws = 20\nestimator = "derivative"\n'
+FIT = """steps = ["fit"]
+[fit]
+delta = 0.4
+sigma = 0.4
+draws = 20
+estimator = "derivative"
+report = false
+"""
 """The quickest fit: what becomes of fits is tried here, not which is the better."""
 
 
@@ -115,7 +123,7 @@ def test_what_one_step_refuses_another_may_take(tmp_path: Path) -> None:
     logs.mkdir()
     shutil.copy(archive(tmp_path / "season", 1).parents[1] / "season" / "season" / "day0.mcap", logs / "long.mcap")
     shutil.copytree(Path(__file__).resolve().parents[2] / "fixtures" / "short_ros2", logs / "brief")
-    recipe(tmp_path, 'steps = ["fit", "evaluate"]\n[fit]\ndraws = 20\nestimator = "derivative"\n')
+    recipe(tmp_path, 'steps = ["fit", "evaluate"]\n[fit]\ndraws = 20\nestimator = "derivative"\nreport = false\n')
     result, told = run(tmp_path, logs / "long.mcap", logs / "brief")
     assert statuses(result) == {"long": "done", "brief": "partly"}
     row = result.rows[1]
@@ -123,6 +131,24 @@ def test_what_one_step_refuses_another_may_take(tmp_path: Path) -> None:
     assert row.evaluate.mse["surge"] > 0.0
     assert row.reason.startswith("fit: too short for three blocks")
     assert told == [f"partly: {logs / 'brief'}: {row.reason}"]
+
+
+@pytest.mark.parametrize("wanted", [True, False])
+@pytest.mark.usefixtures("here")
+def test_a_fit_without_its_page(tmp_path: Path, wanted: bool) -> None:
+    logs = archive(tmp_path, 1)
+    recipe(tmp_path, FIT if not wanted else FIT.replace("report = false", "report = true"))
+    result, _ = run(tmp_path, logs / "*.mcap")
+    (row,) = result.rows
+    folder = tmp_path / "out" / "batch" / row.folder
+    assert row.fit.accepted == json.loads((folder / row.fit.model).read_text("utf-8"))["accepted"]
+    assert [path.name for path in folder.rglob("report.html")] == ["report.html"] * wanted
+    assert (row.fit.report is not None) == wanted
+    data = conforms((tmp_path / "out" / "batch" / "batch.json").read_text("utf-8"))
+    assert data["rows"][0]["fit"]["report"] == row.fit.report
+    assert ("report.html" in Path(result.page).read_text("utf-8")) == wanted
+    table = pq.read_table(result.summary).column("fit_report").to_pylist()
+    assert table == [f"{row.folder}/{row.fit.report}" if wanted else None]
 
 
 @pytest.mark.usefixtures("here")

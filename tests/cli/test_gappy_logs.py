@@ -141,7 +141,7 @@ def test_diagnosis_against_a_simulation(ferryid: Command, place: Path) -> None:
 
 def test_batch(ferryid: Command, place: Path) -> None:
     recipe = place / "recipe.toml"
-    recipe.write_text('steps = ["fit"]\n\n[fit]\ncomponents = 3\n', encoding="utf-8")
+    recipe.write_text('steps = ["fit"]\n\n[fit]\ncomponents = 3\nreport = false\n', encoding="utf-8")
     options = (*VESSEL, "--recipe", recipe, "--processes", "1", "--out", place / "batch")
     (row,) = result(ferryid("batch", place / "gaps.mcap", *options, "--json", "-"))["rows"]
     assert row["status"] == "done", row
