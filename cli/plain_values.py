@@ -117,6 +117,8 @@ def _number(value: Any) -> float:
 def _path(value: Any) -> Path:
     if not isinstance(value, Path):
         value = Path(_text(value))
+    if "\0" in str(value):
+        raise ValueError
     if os.path.exists(value) and not os.access(value, os.R_OK):
         raise ValueError
     return value

@@ -30,15 +30,18 @@ LOG_COLUMNS = 32
 
 def effect_rows(diagnoses: Sequence[Diagnosis]) -> list[dict[str, str]]:
     """Return a row for every effect of several logs: in how many it is, where it is a hint only, and its size over them."""
-    by_key: dict[tuple[str, str | None], list[Finding]] = {}
-    for one in diagnoses:
+    by_key: dict[tuple[str, str | None], list[tuple[int, Finding]]] = {}
+    for log, one in enumerate(diagnoses):
         for finding in one.findings:
-            by_key.setdefault(finding.key, []).append(finding)
+            by_key.setdefault(finding.key, []).append((log, finding))
     rows = []
-    for every in sorted(by_key.values(), key=lambda found: -sum(one.sure for one in found)):
+    for found in sorted(by_key.values(), key=lambda found: -sum(one.sure for _, one in found)):
+        every = [one for _, one in found]
         sure = [one for one in every if one.sure]
-        hints = len(every) - len(sure)
-        counts = [f"{len(sure)} of {len(diagnoses)}"] if sure else []
+        # A log may have several that have no name.
+        certain = {log for log, one in found if one.sure}
+        hints = len({log for log, _ in found} - certain)
+        counts = [f"{len(certain)} of {len(diagnoses)}"] if sure else []
         counts += [f"perhaps {hints}{' more' if sure else f' of {len(diagnoses)}'}"] if hints else []
         rows.append(
             {
@@ -204,13 +207,13 @@ def left_to_the_page(diagnoses: Sequence[Diagnosis], told: Sequence[str]) -> str
 
 
 def names_of(diagnosis: Diagnosis, common: Sequence[Finding] = ()) -> str:
-    """Return the effects of a log in words, hints apart, without those of all logs."""
+    """Return the effects of a log in words, hints apart, without those of all logs where it has others."""
     own = diagnosis_words.findings_of(diagnosis, common)
-    sure = [_inline(one) for one in own if one.sure]
-    hints = [_inline(one) for one in own if not one.sure]
+    sure = list(dict.fromkeys(_inline(one) for one in own if one.sure))
+    hints = [name for name in dict.fromkeys(_inline(one) for one in own if not one.sure) if name not in sure]
     parts = [", ".join(sure)] if sure else []
     parts += [f"perhaps {', '.join(hints)}"] if hints else []
-    return "; ".join(parts) or "–"
+    return "; ".join(parts) or ("only what all logs have" if diagnosis.findings else "–")
 
 
 def _inline(finding: Finding) -> str:

@@ -63,6 +63,7 @@ def render(
         several=several,
         campaign=of_campaign,
         logs=logs,
+        where_common=diagnosis_words.where_common(diagnoses, common),
         common=[_finding(one, f"all-finding-{k}", False, ()) for k, one in enumerate(common, 1)],
         likeness=of_all,
         sign=diagnosis_words.SIGN,
@@ -104,7 +105,7 @@ def _several_as_text(diagnoses: Sequence[Diagnosis]) -> str:
     common = diagnosis_words.findings_of_all(diagnoses)
     together = second_sources.of_all(diagnoses)
     if common:
-        lines = ["In all logs:", *_listed(common)]
+        lines = [f"{diagnosis_words.where_common(diagnoses, common)}:", *_listed(common)]
         blocks.append("\n".join(_folded(line) for line in lines))
     blocks += campaign.text_tables(diagnoses)
     about_all = [*shared, *likeness.notes(diagnoses[0].likeness_of_all, "these logs together")]

@@ -17,12 +17,16 @@ FLOW_COLOURS = {"wind": "c2", "current": "c3"}
 WITHOUT, WITH = "without the findings", "with them"
 
 
-def timeline(diagnosis: Diagnosis) -> Timeline | None:
-    """Return the interactive figures of a log; None where its evidence has too few rows to draw."""
+def timeline(diagnosis: Diagnosis, common: Sequence[Finding] = ()) -> Timeline | None:
+    """Return the interactive figures of a log; None where its evidence has too few rows to draw.
+
+    Findings have the numbers of the headings below; those of all logs, which stand there once, have none.
+    """
     evidence = diagnosis.evidence
     t = evidence.get("t", np.empty(0))
     if len(t) < 2:
         return None
+    own = diagnosis_words.findings_of(diagnosis, common)
     heading = np.radians(evidence["heading"]) if "heading" in evidence else None
     place = None
     if "place" in evidence and heading is not None and np.isfinite(evidence["place"]).all(axis=1).any():
@@ -30,9 +34,9 @@ def timeline(diagnosis: Diagnosis) -> Timeline | None:
     return Timeline(
         diagnosis.log,
         t,
-        (*_left_over(diagnosis), *_flows(diagnosis), *_motion(diagnosis)),
+        (*_left_over(diagnosis, own), *_flows(diagnosis), *_motion(diagnosis)),
         left_out_spans(diagnosis.left_out),
-        tuple(_mark(diagnosis, k) for k in range(len(diagnosis.findings))),
+        tuple(_mark(diagnosis, k, one) for k, one in enumerate(own, 1)),
         place,
         () if heading is None else _arrows(diagnosis, heading),
     )
@@ -44,7 +48,7 @@ def on_timeline(diagnosis: Diagnosis, finding: Finding) -> bool:
     return "explained" in finding.evidence and len(t) > 1 and np.array_equal(t, own)
 
 
-def _left_over(diagnosis: Diagnosis) -> list[Strip]:
+def _left_over(diagnosis: Diagnosis, own: Sequence[Finding]) -> list[Strip]:
     evidence = diagnosis.evidence
     if "before" not in evidence:
         return []
@@ -53,29 +57,27 @@ def _left_over(diagnosis: Diagnosis) -> list[Strip]:
         traces = [Trace(WITHOUT if diagnosis.findings else "left over", evidence["before"][:, j], "base")]
         if diagnosis.findings and "after" in evidence:
             traces.append(Trace(WITH, evidence["after"][:, j], "new"))
-        for k, finding in enumerate(diagnosis.findings):
+        for k, finding in enumerate(own, 1):
             if on_timeline(diagnosis, finding) and finding.labels.get("residual", "").startswith(axis):
                 explained = finding.evidence["explained"]
-                traces.append(Trace(_explains(diagnosis, k), explained, "measured", shown=False, dash=(6.0, 3.0)))
+                traces.append(Trace(_explains(k, finding), explained, "measured", shown=False, dash=(6.0, 3.0)))
         if "thrust" in evidence:
             traces.append(Trace("actuator force", evidence["thrust"][:, j], "grey", shown=False, framing=False))
         strips.append(Strip(f"{axis} {SYMBOLS[j]} left over [{UNITS[j]}]", tuple(traces)))
     return strips
 
 
-def _explains(diagnosis: Diagnosis, k: int) -> str:
-    finding = diagnosis.findings[k]
-    return f"{k + 1}. {diagnosis_words.title(finding.effect, finding.instance)} explains"
+def _explains(k: int, finding: Finding) -> str:
+    return f"{k}. {diagnosis_words.title(finding.effect, finding.instance)} explains"
 
 
-def _mark(diagnosis: Diagnosis, k: int) -> Mark:
-    finding = diagnosis.findings[k]
+def _mark(diagnosis: Diagnosis, k: int, finding: Finding) -> Mark:
     t = diagnosis.evidence["t"]
     spans = finding.intervals
     # What acts in nearly all of the log has no time of its own.
     if spans and spans[0][0] <= t[0] and spans[-1][1] >= t[-1] and len(spans) == 1:
         spans = ()
-    trace = _explains(diagnosis, k) if on_timeline(diagnosis, finding) else ""
+    trace = _explains(k, finding) if on_timeline(diagnosis, finding) else ""
     return Mark(diagnosis_words.title(finding.effect, finding.instance), spans, trace)
 
 
@@ -155,4 +157,5 @@ def _force(label: str, force: Floats, heading: Floats, colour: str, *, shown: bo
 
 def timelines(diagnoses: Sequence[Diagnosis], most: int) -> dict[int, Timeline | None]:
     """Return those of the first `most` logs, by the place of the log."""
-    return {k: timeline(one) for k, one in enumerate(diagnoses[:most])}
+    common = diagnosis_words.findings_of_all(diagnoses)
+    return {k: timeline(one, common) for k, one in enumerate(diagnoses[:most])}

@@ -301,7 +301,8 @@ def about_errors(diagnosis: Diagnosis) -> list[str]:
             *(["unexplained forces"] if any(one.effect == UNKNOWN for one in diagnosis.findings) else []),
         ]
         if absent:
-            lines.append(f"Not subtracted from these errors, and left in both rows: {listed(absent)}.")
+            rows = ", and left in both rows" if fitted(diagnosis) else ""
+            lines.append(f"Not subtracted from these errors{rows}: {listed(absent)}.")
     if diagnosis.moved is not None:
         one = diagnosis.moved
         lines.append(
@@ -333,6 +334,15 @@ def findings_of_all(diagnoses: Sequence[Diagnosis]) -> tuple[Finding, ...]:
         if one.vessel or ("before" not in one.evidence and all((one.key, one.says) in shown for shown in every))
     }
     return tuple(found.values())
+
+
+def where_common(diagnoses: Sequence[Diagnosis], common: Sequence[Finding]) -> str:
+    """Return in which logs the findings of all logs are: a log that differs keeps its own."""
+    return (
+        "In several logs"
+        if any(len(findings_of(one, common)) + len(common) > len(one.findings) for one in diagnoses)
+        else "In all logs"
+    )
 
 
 def findings_of(diagnosis: Diagnosis, shared: Sequence[Finding] = ()) -> list[Finding]:

@@ -27,6 +27,8 @@ WORDS = (
     ["--within", "11"],
     ["--within", "3"],
     ["--folder", "nowhere"],
+    # No shell passes a NUL, but a ferryid.toml may hold one.
+    ["--path", "a\0b"],
     ["--kind", "both"],
 )
 

@@ -14,6 +14,8 @@ from ferryid.diagnose.judging.hidden_gain import HiddenGain
 from ferryid.diagnose.judging.hidden_signal import with_gains
 from ferryid.report.diagnosis_page import as_text
 from ferryid.report.diagnosis_report import as_json, report
+from ferryid.report.diagnosis_timeline import timelines
+from ferryid.report.diagnosis_words import title
 from tests.report.test_diagnosis import conforms, diagnosis, gain, wind
 
 SHARED = "thruster1 gives 85 % of the force that its speed promises."
@@ -85,8 +87,27 @@ def test_what_the_sensors_of_the_vessel_show_stands_once_beside_a_log_that_diffe
     ]
     text = as_text(several)
     assert text.count(late.says) == 1
+    assert text.index("In several logs:") < text.index(late.says)
+    assert "In all logs:" in as_text(several[:2])
     found = as_json(several)["findings"]
     assert [(one["says"], one["log"]) for one in found] == [(late.says, None), (own.says, "third")]
+
+
+def test_findings_have_the_same_numbers_in_the_figures_and_below_them() -> None:
+    weak, blows = campaign()[0].findings[1], wind()
+    late = replace(weak, effect="clock_offset", instance=None, vessel=True)
+    evidence = {"t": blows.evidence["t"], "before": np.zeros((len(blows.evidence["t"]), 3))}
+    several = [
+        replace(one, findings=(late, blows, replace(weak, says=f"{one.log}.")), evidence=evidence) for one in campaign()
+    ]
+    one = timelines(several, 2)[0]
+    assert one is not None
+    assert [mark.title for mark in one.marks] == [title(each.effect, each.instance) for each in (blows, weak)]
+    assert one.marks[0].trace == "1. Steady wind explains"
+    assert one.marks[0].trace in [trace.label for strip in one.strips for trace in strip.traces]
+    (alone,) = timelines(several[:1], 1).values()
+    assert alone is not None
+    assert len(alone.marks) == 3
 
 
 def test_the_share_of_a_withheld_sensor_stands_once_for_all_logs() -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ferryid.diagnose import Diagnosis, Estimate, Finding, Withheld
+from ferryid.diagnose import UNKNOWN, Diagnosis, Estimate, Finding, Withheld
 from ferryid.diagnose.judging.hidden_gain import HiddenGain
 from ferryid.report import campaign
 from ferryid.report.diagnosis_page import as_text, render
@@ -122,10 +122,27 @@ def test_a_terminal_shows_tables_within_its_width_and_leaves_each_log_to_the_pag
     assert "\N{NO-BREAK SPACE}" not in text
 
 
+def test_a_log_with_two_of_a_kind_counts_once() -> None:
+    law, hint = (
+        replace(gain(), effect=UNKNOWN, instance=None),
+        replace(gain(), probability=0.4, effect=UNKNOWN, instance=None),
+    )
+    assert not hint.sure
+    every = [log("a", law, hint), log("b", law, law), log("c", hint, hint)]
+    assert [row["logs"] for row in campaign.effect_rows(every)] == ["2 of 3, perhaps 1 more"]
+    assert [row["logs"] for row in campaign.effect_rows(every[:2])] == ["2 of 2"]
+    assert [campaign.names_of(one) for one in every] == [
+        "something without a name",
+        "something without a name",
+        "perhaps something without a name",
+    ]
+
+
 def test_what_all_logs_have_is_no_name_of_each() -> None:
     every = [log(name, gain(), *one) for name, one in (("a", [flow(1.0, 0.0)]), ("b", []))]
     common = (every[0].findings[0],)
-    assert [campaign.names_of(one, common) for one in every] == ["steady wind", "–"]
+    assert [campaign.names_of(one, common) for one in every] == ["steady wind", "only what all logs have"]
+    assert campaign.names_of(replace(every[1], findings=()), common) == "–"
     assert campaign.names_of(every[1]) == "thruster force (thruster1)"
 
 

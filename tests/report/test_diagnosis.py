@@ -423,6 +423,7 @@ def test_errors_that_no_finding_changes_are_told_once() -> None:
     same = {"mse": by_axis(400.0, 3600.0, 900.0)}
     alone = replace(diagnosis("explained"), findings=(nameless(),), before=same, after=same, verdict="unexplained")
     (row,) = force_rows(alone)
+    assert about_errors(alone) == ["Not subtracted from these errors: unexplained forces."]
     assert row["name"] == "root-mean-square error"
     waves = replace(alone, findings=(replace(nameless(), effect="waves"),), verdict="explained")
     assert headline(waves) == "Explained: the model left out waves."

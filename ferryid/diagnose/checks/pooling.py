@@ -255,6 +255,10 @@ def _pooled(
     pooled = pool(estimates, lasting, lasting.least(logs[showing[0]].measurements))
     if pooled is None or pooled.evidence < CHECKS.pooled_evidence:
         return None
+    # What a log shows that differs is another error.
+    showing = [i for i in showing if i in pooled.inside]
+    if len(showing) < CHECKS.pooled_logs:
+        return None
     values, corrected = pooled.values, lasting.corrected
     away = min(pooled.evidence - CHECKS.pooled_evidence, 700.0)
     finding = SensorFinding(

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.checks import clock_offset, examine, examine_together
-from ferryid.diagnose.checks.check import Lasting
-from ferryid.diagnose.checks.pooling import Common, Examined, pool
+from ferryid.diagnose.checks.check import Lasting, SensorFinding
+from ferryid.diagnose.checks.pooling import Common, Examined, pool, pool_check
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
 from tests.diagnose.checks.test_short_logs import turning
@@ -110,6 +110,28 @@ def test_a_log_that_differs_keeps_its_own_and_says_so() -> None:
     assert "Nothing is corrected in it." in found[4].notes[0]
     assert found[4].measurements is every[4]
     assert "2 logs differ from it" in found[0].findings[0].says
+
+
+def test_what_logs_show_that_differ_from_the_rest_is_not_what_the_rest_have() -> None:
+    # Two logs show errors that have nothing to do with each other; the others, which show none, agree on something small.
+    names = (1.5, -1.5, 0.3, 0.3, 0.3, 0.3)
+    small = turning(7, 30.0)
+    found = [{"clock_offset": own(value)} if k < 2 else {} for k, value in enumerate(names)]
+    every = [Examined(one, replace(small)) for one in found]
+    value_of = {id(one.measurements): value for one, value in zip(every, names, strict=True)}
+    check = replace(clock_offset.CHECK, estimate=lambda one: logs(value_of[id(one)])[0])
+    pool_check(check, (), every)
+    assert [[each.vessel for each in one.findings] for one in every] == [[False], [False], [], [], [], []]
+    # With one more that shows it, they are counted alone.
+    again = [Examined(one, replace(small)) for one in (*found[:2], *[{"clock_offset": own(0.3)}] * 2, {}, {})]
+    value_of |= {id(one.measurements): value for one, value in zip(again, names, strict=True)}
+    pool_check(check, (), again)
+    assert [[each.vessel for each in one.findings] for one in again] == [[False], [False], *[[True]] * 4]
+    assert "2 of 6 logs show it by themselves, 2 logs differ from it" in again[2].findings[0].says
+
+
+def own(seconds: float) -> SensorFinding:
+    return SensorFinding("clock_offset", logs(seconds)[0], "Late.", lambda one: one)
 
 
 def test_one_log_alone_and_copies_of_it_are_no_campaign() -> None:
