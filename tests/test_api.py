@@ -100,3 +100,11 @@ def test_a_session_shows_one_line_of_a_result() -> None:
     assert repr(Outcome({"schema": "ferryid.fit/1", "rows": [0] * 9000}, "Accepted: yes\nand more")) == (
         "<ferryid.fit/1: Accepted: yes>"
     )
+
+
+def test_the_types_that_signatures_name_are_where_the_calls_are() -> None:
+    signature = inspect.signature(api.fit)
+    for name in ("Logs", "Ranges", "Progress"):
+        assert name in {parameter.annotation for parameter in signature.parameters.values()}
+        assert hasattr(api, name)
+    assert signature.parameters["out"].default is api.OUT

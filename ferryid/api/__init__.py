@@ -16,6 +16,10 @@ the remedy, for input that cannot be used; nothing half-written is left. Importi
 from __future__ import annotations
 
 from ferryid.api.archive import batch, doctor
+from ferryid.api.arguments import OUT as OUT
+from ferryid.api.arguments import Logs as Logs
+from ferryid.api.arguments import Progress as Progress
+from ferryid.api.arguments import Ranges as Ranges
 from ferryid.api.diagnosis import compare_groups, diagnose, plan
 from ferryid.api.fitting import compare, evaluate, fit, sweep
 from ferryid.api.logs import ingest, inspect

@@ -134,7 +134,7 @@ class FitSettings:
         if not 1 <= self.draws <= 100_000:
             raise FerryIdError(f"draws: {self.draws} is no number of draws. Fix: give 1 to 100000, 500 is usual")
         if not 0 <= self.seed < 2**63:
-            raise FerryIdError(f"--seed: {self.seed} is no seed. Fix: give a whole number from 0 on")
+            raise FerryIdError(f"--seed: {self.seed} is no seed. Fix: give a whole number from 0 to {2**63 - 1}")
         for key in ("delta", "sigma", "zeta"):
             value = getattr(self, key)
             if not IDENTIFY.least_factor <= value <= 100.0 and not (key == "sigma" and value == 0.0):

@@ -35,6 +35,13 @@ def fitted(monkeypatch: pytest.MonkeyPatch, opened: Opened, settings: FitSetting
     return fit_logs(["short.mcap"], PROFILE, settings, RunContext(Path("nowhere")))
 
 
+@pytest.mark.parametrize("seed", [-1, 2**63])
+def test_a_seed_that_is_refused_is_outside_the_range_that_is_told(seed: int) -> None:
+    with pytest.raises(FerryIdError, match=rf"^--seed: {seed} is no seed\. Fix: .* from 0 to {2**63 - 1}$"):
+        FitSettings(seed=seed)
+    assert FitSettings(seed=2**63 - 1).seed == 2**63 - 1
+
+
 @pytest.mark.parametrize("factor", ["delta", "sigma", "zeta"])
 @pytest.mark.parametrize("value", [1e-320, 9e-4, -1.0, 101.0, math.nan])
 def test_a_factor_that_is_hardly_there_is_refused(factor: str, value: float) -> None:
