@@ -227,7 +227,7 @@ def _concluded(
         if updates
         else None,
         remainder=remainder,
-        least_sizes=least_sizes(problem, kept, chances),
+        least_sizes=least_sizes(problem, kept, chances, {one.key for one in findings}),
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from math import hypot, isfinite
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, fitted_force_model
 from ferryid.diagnose.inference.thresholds import INFERENCE
+from ferryid.diagnose.judging.claims import Key
 from ferryid.diagnose.judging.detection_power import DetectionPower
 from ferryid.effects.effect import HELD
 from ferryid.effects.wording import titled
@@ -46,7 +47,9 @@ class LeastSize(Record):
         return _text(self.value, self.unit)
 
 
-def least_sizes(problem: EstimationProblem, kept: Fit, powers: Sequence[DetectionPower]) -> tuple[LeastSize, ...]:
+def least_sizes(
+    problem: EstimationProblem, kept: Fit, powers: Sequence[DetectionPower], named: Collection[Key] = ()
+) -> tuple[LeastSize, ...]:
     """Return the least size that a log would have shown of each effect that was not found in it.
 
     Parameters
@@ -57,6 +60,8 @@ def least_sizes(problem: EstimationProblem, kept: Fit, powers: Sequence[Detectio
         From `ferryid.diagnose.judging.detection_power.detection_powers`: multiples of the usual size at which the evidence
         has an even chance. What moves the vessel less than `INFERENCE.void_share`, or is less than the effect's least size, is
         not named whatever the evidence.
+    named
+        What has a finding that is not of this fit: of all logs of a campaign, or of the sensors.
     """
     force_model = fitted_force_model(problem.plain, kept)
     windows = problem.windows
@@ -65,6 +70,8 @@ def least_sizes(problem: EstimationProblem, kept: Fit, powers: Sequence[Detectio
     made = []
     for one in powers:
         candidate = one.candidate
+        if candidate.key in named:
+            continue
         moved = windows.gap(candidate.act(force_model, one.usual)) - before
         share = float((np.sqrt(np.mean(moved**2, axis=0)) / usual).max())
         multiple = max(one.multiple, INFERENCE.void_share / max(share, 1e-12))
@@ -91,7 +98,12 @@ def _least(candidate: Candidate, value: float | None) -> LeastSize:
 def _text(value: float | None, unit: str) -> str:
     if value is None:
         return "not at any size"
-    return f"{100.0 * value:.2g} %" if unit == "-" else f"{value:.2g} {unit}"
+    return f"{_two_digits(100.0 * value)} %" if unit == "-" else f"{_two_digits(value)} {unit}"
+
+
+def _two_digits(value: float) -> str:
+    """Return a number of two significant digits, without an exponent where it is a hundred or more."""
+    return f"{float(f'{value:.2g}'):g}"
 
 
 def _mine(candidate: Candidate) -> list[int]:

@@ -49,7 +49,19 @@ def test_a_push_that_noise_hides_is_the_length_of_its_vector() -> None:
     one = least("external_push", [300.0, 400.0, 10.0], 1.5)
     assert one.value == pytest.approx(1.5 * hypot(300.0, 400.0))
     assert one.unit == "N"
-    assert one.says == "External push: below 7.5e+02 N would not have been seen here."
+    assert one.says == "External push: below 750 N would not have been seen here."
+
+
+def test_a_percentage_above_a_hundred_is_written_out() -> None:
+    assert LeastSize("thruster_gain", "aft", 1.328, "-", "").text == "130 %"
+    assert LeastSize("heading_bias", None, 0.0123, "deg", "").text == "0.012 deg"
+
+
+def test_what_all_logs_of_a_campaign_show_is_not_among_what_was_not_found() -> None:
+    # The log's own fit has no such candidate; the finding comes from all logs together.
+    powers = [DetectionPower(candidate("external_push"), 0.5, np.array([300.0, 400.0, 10.0]), 1.5)]
+    assert len(least_sizes(problem(), NOTHING, powers, {("wind", None)})) == 1
+    assert least_sizes(problem(), NOTHING, powers, {("external_push", None)}) == ()
 
 
 def test_what_hardly_moves_the_vessel_is_not_named_whatever_the_evidence() -> None:
