@@ -25,6 +25,7 @@ NO_DECISION = {
         signals.kalman WINDOW_PER_TIME
         draft.write USUAL_THRUST
         effects.payload WATER WATERPLANE
+        effects.wind_loads EIGHTH SIXTEENTH THREE_SIXTEENTHS TANGENT_EIGHTH
         diagnose.data.course NORMAL
         identify.adaptive.averaging NORMAL_95
         diagnose.second_sources.comparison NORMAL_95

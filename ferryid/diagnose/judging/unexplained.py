@@ -83,7 +83,7 @@ def find_unexplained(
         claims.append(Claim(shared, Figures("law")))
         after, refitted = common.fit, common.problem
     if folds is not None and (law := select_law(refitted, after, folds)) is not None:
-        own = _lawful(law, after, measurements, "that was seen in this log only")
+        own = _lawful(law, after, measurements, "that was fitted to this log only")
         claims.append(Claim(own, Figures("law", other_logs=None if laws is None else OtherLogs(*laws.of_others(law)))))
         after, refitted = law.fit, law.problem
     left = locate(refitted, after, after, measurements)

@@ -101,7 +101,7 @@ def test_others_are_counted_by_what_they_can_show() -> None:
     logs = with_force(1)
     problem, kept = logs["0"]
     alone = find_unexplained(problem, kept, sailed(0)).claims[0].finding
-    assert "that was seen in this log only" in alone.says
+    assert "that was fitted to this log only" in alone.says
     assert alone.sure
     told = find_campaign_laws(logs)
     assert told["0"].law is None
