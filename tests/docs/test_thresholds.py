@@ -31,7 +31,6 @@ NO_DECISION = {
         diagnose.second_sources.comparison NORMAL_95
         diagnose.second_sources.samples _TURN
         identify.free_run_checks _DEGREES
-        effects.wind_loads EIGHTH SIXTEENTH THREE_SIXTEENTHS TANGENT_EIGHTH
         diagnose.judging.group_loads BONFERRONI
         identify.split _GOLDEN
     """,

@@ -48,7 +48,9 @@ def with_lows(stands: Elimination, forces: list[float], runs: list[float], score
 
 
 def judged_by_rules(problem: EstimationProblem, stands: Elimination) -> tuple[Finding, tuple[str, ...]]:
-    (finding,), notes = apply_rules(force_claims(problem, stands, problem.windows.measurements), LogFigures())
+    (finding,), notes = apply_rules(
+        force_claims(problem, stands, problem.windows.measurements, hull_known=True), LogFigures()
+    )
     return finding, notes
 
 
@@ -177,7 +179,7 @@ def test_only_an_axis_that_is_claimed_shows_a_finding(
     shows: bool,
 ) -> None:
     problem, stands = windy
-    (claim,) = force_claims(problem, with_lows(stands, forces, runs), problem.windows.measurements)
+    (claim,) = force_claims(problem, with_lows(stands, forces, runs), problem.windows.measurements, hull_known=True)
     finding = replace(claim.finding, axes=dict(zip(AXES, shares, strict=True)))
     judged, _ = improves_no_claimed_axis(finding, Context(claim.figures))
     assert judged is not None
@@ -187,7 +189,10 @@ def test_only_an_axis_that_is_claimed_shows_a_finding(
 def test_a_strong_likelihood_needs_no_more(windy: tuple[EstimationProblem, Elimination]) -> None:
     problem, stands = windy
     (claim,) = force_claims(
-        problem, with_lows(stands, [-0.1] * 3, [-0.1] * 4, score=45.0), problem.windows.measurements
+        problem,
+        with_lows(stands, [-0.1] * 3, [-0.1] * 4, score=45.0),
+        problem.windows.measurements,
+        hull_known=True,
     )
     assert improves_no_claimed_axis(claim.finding, Context(claim.figures)) == (claim.finding, "")
 
