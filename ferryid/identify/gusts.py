@@ -111,12 +111,13 @@ class Gusts:
     def _uncertain(self, k: int, equations: GustEquations) -> None:
         """Add up the expected squares of what remains uncertain, in the measure of the process and in the targets."""
         size, rng = equations.bands.shape[1], np.random.default_rng(0)
-        probes = rng.choice([-1.0, 1.0], (size, _PROBES))
-        self._sums.append((float(np.sum(self._weighted(k, probes) * equations.solve(probes))) / _PROBES, size))
+        process = rng.choice([-1.0, 1.0], (size, _PROBES))
         signs = rng.choice([-1.0, 1.0], (size // 2, _PROBES))
-        for axis in range(3):
-            probes = (equations.slope[:, axis, :, None] * signs[:, None, :]).reshape(size, _PROBES)
-            self.uncertain[axis] += float(np.sum(probes * equations.solve(probes))) / _PROBES
+        targets = (equations.slope.transpose(0, 2, 1)[..., None] * signs[:, None, None, :]).reshape(size, 3, _PROBES)
+        # One factorisation for all of them.
+        found = equations.solve(np.column_stack([process, targets.reshape(size, -1)]))
+        self._sums.append((float(np.sum(self._weighted(k, process) * found[:, :_PROBES])) / _PROBES, size))
+        self.uncertain += np.sum(targets * found[:, _PROBES:].reshape(targets.shape), axis=(0, 2)) / _PROBES
 
     def _weighted(self, k: int, values: Floats) -> Floats:
         """Return the process's precision times values, shape (2 J, c)."""
