@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from ferryid.diagnose.checks.screening import screen_sensors
 from ferryid.diagnose.data.measurements import measure_log
 from ferryid.diagnose.inference.campaign import assemble
 from ferryid.diagnose.inference.group_differences import GROUPS, in_groups
 from ferryid.diagnose.inference.stages import AveragedLog, average
 from ferryid.diagnose.judging.group_differences import JudgedGroups, judge_groups
+from ferryid.effects import effects
+from ferryid.effects.force_model import hull_of
+from ferryid.effects.measurements import hull_force_model
 from ferryid.types import IN_MEMORY, no_progress
 from ferryid.vessel import load_profile
 from ferryid.vessel.profile import Profile
@@ -63,10 +68,14 @@ def judged(case: Case) -> JudgedGroups:
 
 
 def _weakened(path: str, profile: Profile, factor: float) -> AveragedLog:
-    """Return a log whose recorded force is so large that what truly acted is a factor of it."""
+    """Return a log whose recorded thrust is so large that what truly acted is a factor of it; rudders felt what acted."""
     screened = screen_sensors(measure_log(path, profile, IN_MEMORY), no_progress)
-    parts = screened.measurements.parts / factor
-    return average(replace(screened, measurements=replace(screened.measurements, parts=parts)))
+    seen = screened.measurements
+    recorded = hull_force_model(seen, hull_of(profile))
+    for name in seen.names:
+        recorded = effects()["thruster_gain"].apply(recorded, np.array([1.0 / factor]), name)
+    rudders = None if seen.rudders is None else seen.rudders * (1.0 / factor, 1.0)
+    return average(replace(screened, measurements=replace(seen, parts=recorded.parts, rudders=rudders)))
 
 
 def section() -> str:
