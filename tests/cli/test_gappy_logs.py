@@ -13,7 +13,7 @@ import pytest
 from tests.command_line.in_process import Run
 from tests.damage import NAVIGATION, THRUSTER, silent, ten_minutes, without_heading, written
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.draws]
 
 SECONDS = (0.3, 1.0, 5.0, 60.0)
 VESSEL = ("--vessel", "milliampere")
