@@ -148,7 +148,7 @@ main()
 
 
 @pytest.mark.parametrize(
-    "name", ["typer", "ferryid.cli.app", "ferryid.cli.cmd_fit", "ferryid.errors", "numpy", "scipy.special", "numba"]
+    "name", ["typer", "ferryid.cli.app", "ferryid.cli.cmd_fit", "ferryid.errors", "numpy", "scipy.special", "pyarrow"]
 )
 def test_an_interrupt_during_imports_is_one(tmp_path: Path, fixtures: Path, name: str) -> None:
     code = AT_IMPORT.format(name=name, number=int(signal.SIGINT))
