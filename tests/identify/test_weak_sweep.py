@@ -84,6 +84,7 @@ def test_a_window_longer_than_the_manoeuvres_is_not_taken(run: Run) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.draws
 def test_what_is_told(run: Run) -> None:
     days = [measured(seed, noise=20.0, seconds=120.0) for seed in (1, 2)]
     found = run("both", days, windows_s=(5.0, 8.0))
