@@ -82,7 +82,7 @@ class BytesSource:
         for place, number in zip(places.tolist(), range(first, first + count), strict=True):
             data, size = next(self.messages), int(self.sizes[number])
             if len(data) != size:
-                raise ValueError(f"a message of {len(data)} bytes where {size} were announced")
+                raise ValueError(f"a message has {len(data)} of {size} announced bytes")
             times = int(self.receive_ns[number]), int(self.stamp_ns[number])
             length = MESSAGE.size - OPCODE_BYTES + size
             MESSAGE.pack_into(content, place, Opcode.MESSAGE, length, self.channel, number, *times)

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ferryid.counts import counted
 from ferryid.diagnose import Estimate
 from ferryid.effects import Effect, effects
 from ferryid.effects.effect import HELD
@@ -192,8 +193,8 @@ def _cut(log: str, profile: Profile, out: Path) -> Segments:
             row += 1
     if len(starts) < FEWEST:
         raise FerryIdError(
-            f"{log}: {len(starts)} stretches of {length_s:.0f} s with force and motion are too few to choose effects by, "
-            f"which needs {FEWEST}. Fix: give a longer log"
+            f"{log}: too short to choose effects by, found {counted(len(starts), 'stretch')} of {length_s:.0f} s with force "
+            f"and motion, {FEWEST} are needed. Fix: give a longer log"
         )
     one = Segments(plain, np.array(starts), stride, steps, np.ones(6))
     placed = np.isfinite(seen.eta[:, :2]).all()
