@@ -112,12 +112,13 @@ def paired_interval(difference: Floats, clusters: Ints) -> tuple[float, float, f
     The variance is that of a mean of clusters of unequal size (Liang and Zeger 1986) with the factor G/(G - 1), the
     quantile Student's with G - 1 degrees of freedom.
     """
+    # Takes a tenth of a second to load, and not every fit has clusters.
+    from scipy.special import stdtrit
+
     mean = float(difference.mean())
     which = np.unique(clusters, return_inverse=True)[1].reshape(-1)
     sums = np.bincount(which, weights=difference - mean)
     count = len(sums)
     error = float(np.sqrt(count / (count - 1) * np.sum(sums**2)) / len(difference))
-    from scipy.special import stdtrit  # a tenth of a second to import: only where it is needed
-
     reach = float(stdtrit(count - 1, 0.5 + IDENTIFY.free_run_level / 2)) * error
     return mean, mean - reach, mean + reach

@@ -89,8 +89,8 @@ def section() -> str:
         [
             "\n## Differences between groups\n",
             "As `ferryid diagnose A... --versus B...` judges them, wind of Esso Osaka measured. A *factor* other than 1 is "
-            "that of the propeller's force in B relative to A, concealed by calculation: the recorded force is larger by its "
-            "inverse, while the motion stays as it was.",
+            "that of the propeller's thrust in B relative to A, concealed by calculation: the recorded thrust is larger by its "
+            "inverse, and the rudder's force follows it, while the motion stays as it was.",
             "",
             "| groups | factor | verdict | differences of the vessel |",
             "|---|---|---|---|",
