@@ -36,7 +36,7 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
 
 def cannot(measurements: Measurements) -> str:
     """Say why the measurements cannot show fouling."""
-    return "" if measurements.profile.hull.has_model else "the profile has no hull model"
+    return measurements.profile.hull.why_unknown
 
 
 def says(values: Values, instance: str | None) -> str:

@@ -22,6 +22,7 @@ import numpy as np
 
 from ferryid.effects.effect import HELD, Choice, Effect, Parameter, Residual, Values
 from ferryid.effects.force_model import COEFFICIENTS, MASS, ForceModel, Measurements, hull_of
+from ferryid.effects.hull_spread import hull_model_spread
 from ferryid.effects.linear_evidence import hull_jacobian
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
@@ -52,7 +53,8 @@ def choose(force_model: ForceModel, prior_hull: Floats, residual: Residual) -> C
     able = [name for name in names if name not in ARMS]
     places = [COEFFICIENTS.index(name) for name in able]
     J, e = hull_jacobian(force_model, prior_hull, residual, places)
-    chosen, log_alternatives = _best_subset(J.T @ J, -J.T @ e, able)
+    usual = hull_model_spread(force_model.measurements.profile)
+    chosen, log_alternatives = _best_subset(J.T @ J, -J.T @ e, able, usual)
     if 2 * len(chosen) > len(able):
         # A model that is wrong all over is wrong there, too.
         chosen |= frozenset(ARMS)
@@ -61,7 +63,7 @@ def choose(force_model: ForceModel, prior_hull: Floats, residual: Residual) -> C
     )
 
 
-def _best_subset(G: Floats, b: Floats, names: list[str]) -> tuple[frozenset[str], float]:
+def _best_subset(G: Floats, b: Floats, names: list[str], usual: float) -> tuple[frozenset[str], float]:
     """Return the coefficients whose evidence is best, going from few to many and from many to few, and what choosing cost."""
     n = len(names)
 
@@ -73,7 +75,7 @@ def _best_subset(G: Floats, b: Floats, names: list[str]) -> tuple[frozenset[str]
     def score(chosen: frozenset[str]) -> float:
         if not chosen or chosen == SURGE_ALONE:
             return -np.inf
-        spread = np.array([EFFECTS.selected_spread if name in chosen else EFFECTS.hull_spread for name in names])
+        spread = np.array([EFFECTS.selected_spread if name in chosen else usual for name in names])
         A = np.eye(n) + G * np.outer(spread, spread)
         c = spread * b
         return 0.5 * float(c @ np.linalg.solve(A, c)) - 0.5 * float(np.linalg.slogdet(A)[1]) - log_alternatives(chosen)
@@ -99,7 +101,7 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
 
 def cannot(measurements: Measurements) -> str:
     """Say why the measurements cannot show a wrong hull model."""
-    return "" if measurements.profile.hull.has_model else "the profile has no hull model"
+    return measurements.profile.hull.why_unknown
 
 
 def says(values: Values, instance: str | None) -> str:

@@ -1,15 +1,21 @@
-"""How large the coefficients of a hull may be that nobody has modelled, from its dimensions and its speed."""
+"""How far off a hull's coefficients may be: by a share where there is a model of it, else by its dimensions and speed."""
 
 from __future__ import annotations
 
-from math import sqrt
+from math import isfinite, sqrt
 
 import numpy as np
 
 from ferryid.effects.force_model import COEFFICIENTS
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
 from ferryid.vessel.dimensions import BLOCK_COEFFICIENT, WATER_DENSITY, dimensions, froude_seconds
 from ferryid.vessel.profile import Profile
+
+
+def hull_model_spread(profile: Profile) -> float:
+    """Return the standard deviation of a hull model's coefficients as a share of each: the profile's, or the usual one."""
+    return profile.hull.spread if isfinite(profile.hull.spread) else EFFECTS.hull_spread
 
 
 def default_hull_spread(profile: Profile, nu: Floats) -> Floats:

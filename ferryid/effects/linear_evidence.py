@@ -8,7 +8,6 @@ import numpy as np
 
 from ferryid.effects.effect import Residual
 from ferryid.effects.force_model import ForceModel
-from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
 
 DIFFERENCE_STEP = 0.01
@@ -32,7 +31,7 @@ def hull_jacobian(
     return J, e - J @ np.array(away)
 
 
-def profiled_loss(J: Floats, residuals: Floats) -> Floats:
+def profiled_loss(J: Floats, residuals: Floats, spread: float) -> Floats:
     """Return the negative logarithm of the likelihood of each of some residuals, with the hull profiled_loss to it.
 
     Parameters
@@ -41,14 +40,16 @@ def profiled_loss(J: Floats, residuals: Floats) -> Floats:
         From `hull_jacobian`.
     residuals
         With the hull as believed, shape (w, q).
+    spread
+        Standard deviation by which the hull's coefficients are believed to be off, as a share of each.
     """
-    H = EFFECTS.hull_spread * J
+    H = spread * J
     product = H.T @ residuals
     share = np.einsum("pq,pq->q", product, np.linalg.solve(H.T @ H + np.eye(H.shape[1]), product))
     return np.asarray(0.5 * (np.einsum("wq,wq->q", residuals, residuals) - share))
 
 
-def log_evidence_gains(J: Floats, e: Floats, columns: Floats, size: float) -> Floats:
+def log_evidence_gains(J: Floats, e: Floats, columns: Floats, size: float, spread: float) -> Floats:
     """Return the evidence of each of some alternatives, with the hull's coefficients profiled_loss beside it.
 
     Parameters
@@ -59,8 +60,10 @@ def log_evidence_gains(J: Floats, e: Floats, columns: Floats, size: float) -> Fl
         Derivatives of the residual by the one parameter of each alternative, shape (w, q).
     size
         Standard deviation of what is believed of that parameter.
+    spread
+        As of `profiled_loss`.
     """
-    H, every = EFFECTS.hull_spread * J, np.column_stack([e, columns])
+    H, every = spread * J, np.column_stack([e, columns])
     free = every - H @ np.linalg.solve(H.T @ H + np.eye(H.shape[1]), H.T @ every)
     power = np.einsum("wq,wq->q", columns, free[:, 1:])
     product = columns.T @ free[:, 0]

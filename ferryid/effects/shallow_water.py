@@ -13,6 +13,7 @@ import numpy as np
 
 from ferryid.effects.effect import Choice, Effect, Parameter, Residual, Values
 from ferryid.effects.force_model import ForceModel, Measurements, added_mass
+from ferryid.effects.hull_spread import hull_model_spread
 from ferryid.effects.linear_evidence import hull_jacobian, log_evidence_gains
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats, Ints
@@ -99,13 +100,13 @@ def choose(force_model: ForceModel, prior_hull: Floats, residual: Residual) -> C
         return Choice(parameters_of(measurements.profile), 0.0)
     south, north, west, east = south[fits], north[fits], west[fits], east[fits]
     J, linear = hull_jacobian(force_model, prior_hull, residual, np.flatnonzero(prior_hull).tolist())
-    gains = np.empty(len(south))
+    spread, gains = hull_model_spread(measurements.profile), np.empty(len(south))
     at_once = max(1, int(MOST_VALUES / len(e)))
     for first in range(0, len(south), at_once):
         some = slice(first, first + at_once)
         a, b, c, d = south[some], north[some], west[some], east[some]
         columns = (sums[b, d] - sums[a, d] - sums[b, c] + sums[a, c]).T
-        gains[some] = log_evidence_gains(J, linear, columns, FACTOR.size)
+        gains[some] = log_evidence_gains(J, linear, columns, FACTOR.size, spread)
     k = int(np.argmax(gains))
     sides = (lines[south[k], 0], lines[north[k], 0], lines[west[k], 1], lines[east[k], 1])
     sizes = np.repeat((high - low) / CELLS, 2)
@@ -115,8 +116,8 @@ def choose(force_model: ForceModel, prior_hull: Floats, residual: Residual) -> C
 
 def cannot(measurements: Measurements) -> str:
     """Say why the measurements cannot show shallow water."""
-    if not measurements.profile.hull.has_model:
-        return "the profile has no hull model"
+    if unknown := measurements.profile.hull.why_unknown:
+        return unknown
     return "" if np.isfinite(measurements.eta[measurements.usable, :2]).all() else "the log has no position"
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from ferryid.effects.effect import Choice, Effect, Parameter, Residual, Turbulence, Values, span
 from ferryid.effects.force_model import ForceModel, Measurements, wind_load
+from ferryid.effects.hull_spread import hull_model_spread
 from ferryid.effects.linear_evidence import hull_jacobian, profiled_loss
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.effects.wording import bearing
@@ -56,7 +57,8 @@ def choose(force_model: ForceModel, prior_hull: Floats, residual: Residual) -> C
     left = np.column_stack([e + residual(apply(force_model, wind, None)) - calm for wind in winds])
     sizes = np.array([one.size for one in parameters[:2]])
     away = np.array([float(np.sum((wind / sizes) ** 2)) for wind in winds])
-    best = winds[int(np.argmin(profiled_loss(J, left) + 0.5 * away))]
+    spread = hull_model_spread(force_model.measurements.profile)
+    best = winds[int(np.argmin(profiled_loss(J, left, spread) + 0.5 * away))]
     begun = (replace(one, start=float(at)) for one, at in zip(parameters[:2], best, strict=True))
     return Choice((*begun, *parameters[2:]), 0.0)
 

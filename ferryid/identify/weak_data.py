@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -301,7 +302,7 @@ class WeakData(LogData):
 
         What a hull model leaves out is small. Where there is none, lift may be as large as the Coriolis force itself.
         """
-        if self.settings.reduced or not self.profile.hull.has_model:
+        if self.settings.reduced or not self.profile.hull.is_known:
             return ()
         spread = self.prior_factor * self._damping_spread
         return tuple(replace(one, spread=float(spread[one.term, one.axis])) for one in self._coriolis)
@@ -311,19 +312,28 @@ class WeakData(LogData):
         """Standard deviations of the prior of the water's force, lift among it, shape (K, 3); infinite elsewhere."""
         spread = np.full((len(self.functions.terms), 3), np.inf)
         known = default_hull_spread(self.profile, self.training_velocities)
-        if self.profile.hull.has_model:
-            known = IDENTIFY.hull_spread * np.abs(hull_of(self.profile)) + IDENTIFY.unmodelled_share * known
+        if self.profile.hull.is_known:
+            known = (
+                self._stated_spread(IDENTIFY.hull_spread) * np.abs(hull_of(self.profile))
+                + IDENTIFY.unmodelled_share * known
+            )
         for name, places in MAPPED.items():
             for term, axis in places:
                 if term in self.functions.terms and not name.startswith("m"):
                     spread[self.functions.terms.index(term), axis] = known[COEFFICIENTS.index(name)]
         return spread
 
+    def _stated_spread(self, usual: float) -> float:
+        """Return how far off the profile says that its hull model is, or the usual spread where it says nothing."""
+        return self.profile.hull.spread if isfinite(self.profile.hull.spread) else usual
+
     @cached_property
     def prior_spread(self) -> Floats:
         """Standard deviations of the prior of each gain, shape (K, 3); infinite where nothing is known."""
         spread = self._damping_spread.copy()
-        share = IDENTIFY.mass_spread if self.profile.hull.has_model else IDENTIFY.unknown_mass_spread
+        share = (
+            self._stated_spread(IDENTIFY.mass_spread) if self.profile.hull.is_known else IDENTIFY.unknown_mass_spread
+        )
         mass = self.windows.base_mass
         for column, name in enumerate(ACCELERATIONS):
             if name in self.functions.terms:

@@ -32,6 +32,10 @@ def _hull(profile: Profile) -> list[str]:
     ]
     if hull.has_model:
         lines.append("  D: " + ", ".join(f"{term} {value:g}" for term, value in hull.D.items()))
+    if math.isinf(hull.spread):
+        lines.append("  coefficients of M and D: may be off by any amount")
+    elif math.isfinite(hull.spread):
+        lines.append(f"  coefficients of M and D: standard deviation {100.0 * hull.spread:g} % of each")
     else:
         lines.append("  D: none known. The base model is mass alone.")
     return [*lines, ""]

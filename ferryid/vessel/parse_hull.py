@@ -12,6 +12,9 @@ from ferryid.vessel.profile import Hull, WindAreas
 MOST_LENGTH_M, MOST_AREA_M2, MOST_MASS_KG = 1e3, 1e5, 1e9
 """Beyond the largest ships; `MOST_RATIO` is for coefficients without a unit."""
 MOST_RATIO = 1e3
+UNKNOWN = "unknown"
+MOST_SPREAD = 1.0
+"""A coefficient that may be off by more than itself is not known."""
 
 DAMPING_TERMS = (
     "X_u",
@@ -58,10 +61,22 @@ def parse_hull(reader: TableReader | None) -> Hull | None:
     rigid = rigid_mass(mass_kg, x_g_m, inertia_z)
     total = _mass_matrix(reader.table("M"), rigid)
     damping = _damping(reader.table("D"))
+    spread = _spread(reader)
+    if not math.isnan(spread) and not damping:
+        reader.fault(
+            '"spread" is how far off [hull.M] and [hull.D] may be, and there is no [hull.D]. Fix: remove it', "spread"
+        )
     reader.close()
     if not math.isnan(length_m) and abs(x_g_m) > length_m:
         reader.fault(f'"x_g_m" = {x_g_m:g} lies outside a hull of {length_m:g} m', "x_g_m")
-    return Hull(length_m, beam_m, draught_m, mass_kg, inertia_z, x_g_m, total, damping)
+    return Hull(length_m, beam_m, draught_m, mass_kg, inertia_z, x_g_m, total, damping, spread)
+
+
+def _spread(reader: TableReader) -> float:
+    """Take how far off the coefficients are believed to be: a share of each, or that it is not known."""
+    if isinstance(reader.data.get("spread"), str):
+        return math.inf if reader.text("spread", options=(UNKNOWN,)) else math.nan
+    return reader.number("spread", above=0.0, at_most=MOST_SPREAD)
 
 
 def rigid_mass(mass_kg: float, x_g_m: float, inertia_z: float) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:

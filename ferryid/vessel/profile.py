@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import inf, nan
 
 from ferryid.ingest.log import TableLayout
 from ferryid.types import Floats
@@ -28,6 +29,9 @@ class Hull:
     D
         Damping coefficients by SNAME name (``"X_u"``, ``"X_|u|u"``, ``"Y_vvv"`` ...), negative where they damp; empty
         where no hull model is known.
+    spread
+        Standard deviation by which the coefficients of M and D are believed to be off, as a share of each; infinite where
+        the profile says that it is unknown, NaN where it says nothing.
     """
 
     length_m: float
@@ -38,11 +42,24 @@ class Hull:
     x_g_m: float
     M: Floats
     D: Mapping[str, float]
+    spread: float = nan
 
     @property
     def has_model(self) -> bool:
-        """True where damping coefficients are known, not rigid-body mass alone."""
+        """True where damping coefficients are stated, not rigid-body mass alone."""
         return bool(self.D)
+
+    @property
+    def is_known(self) -> bool:
+        """True where there is a hull model that estimates may lean on: one whose spread is not unknown."""
+        return not self.why_unknown
+
+    @property
+    def why_unknown(self) -> str:
+        """Why estimates cannot lean on a hull model, as the end of a sentence; empty where they can."""
+        if not self.has_model:
+            return "the profile has no hull model"
+        return "the profile says that the spread of its hull model is unknown" if self.spread == inf else ""
 
 
 @dataclass(frozen=True)

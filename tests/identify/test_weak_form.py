@@ -12,6 +12,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from ferryid.effects.force_model import COEFFICIENTS
+from ferryid.effects.hull_spread import default_hull_spread
 from ferryid.errors import FerryIdError
 from ferryid.identify import inputs
 from ferryid.identify.estimation import estimate_correction
@@ -20,6 +22,7 @@ from ferryid.identify.motion_data import compute_residuals
 from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.split import Split
+from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.weak_data import WeakData, _decorrelate, weak_data
 from ferryid.identify.weak_rows import average_over_windows, to_force
 from ferryid.models.forces import ACCELERATIONS, effective_mass, motion_force
@@ -30,6 +33,7 @@ from ferryid.signals.prepare import Opened, open_track
 from ferryid.signals.smooth import smooth_measured
 from ferryid.signals.track import Motion
 from ferryid.types import RunContext, no_progress
+from ferryid.vessel.profile import Profile
 from tests.identify.rounds import PROFILE, RATE_HZ, motion
 from tests.identify.trials import measured
 
@@ -119,11 +123,11 @@ def test_an_exact_law_comes_back_from_the_weak_form() -> None:
     np.testing.assert_allclose(constants[1], constant)
 
 
-def data_of(logs: list[Any], **settings: Any) -> WeakData:
+def data_of(logs: list[Any], profile: Profile = PROFILE, **settings: Any) -> WeakData:
     """Return logs of which every row trains."""
     chosen = FitSettings(**settings)
     motions = [replace(smooth_measured(one, 1.0), log=f"{one.log} {number}") for number, one in enumerate(logs)]
-    plain = compute_residuals(PROFILE, chosen, [SimpleNamespace(motion=each, quality={}) for each in motions])  # type: ignore[misc]
+    plain = compute_residuals(profile, chosen, [SimpleNamespace(motion=each, quality={}) for each in motions])  # type: ignore[misc]
     masks = tuple(each.valid for each in plain.motions)
     return weak_data(replace(plain, split=Split("none", masks, tuple(np.zeros_like(mask) for mask in masks), 0.0)))
 
@@ -368,3 +372,25 @@ def test_what_only_the_prior_determines_has_its_spread() -> None:
     # In surge the data leave less of it.
     u = BASIS.terms.index("u_dot")
     assert drawn[:, u, 0].std() < 0.2 * data.prior_spread[u, 0]
+
+
+@pytest.mark.parametrize("spread", [0.05, 0.8])
+def test_the_prior_has_the_spread_that_the_profile_states(spread: float) -> None:
+    logs = [measured(seed, seconds=300.0, jitter=0.02) for seed in range(2)]
+    stated = replace(PROFILE, hull=replace(PROFILE.hull, spread=spread))
+    usual, data = data_of(logs), data_of(logs, profile=stated)
+    u, uu = BASIS.terms.index("u_dot"), BASIS.terms.index("|u|u")
+    assert data.prior_spread[u, 0] == pytest.approx(spread)
+    less = data.prior_spread[uu, 0] - usual.prior_spread[uu, 0]
+    assert less == pytest.approx((spread - IDENTIFY.hull_spread) * abs(PROFILE.hull.D["X_|u|u"]))
+
+
+def test_a_hull_of_unknown_spread_may_be_any_that_a_vessel_of_its_size_has() -> None:
+    logs = [measured(seed, seconds=300.0, jitter=0.02) for seed in range(2)]
+    data = data_of(logs, profile=replace(PROFILE, hull=replace(PROFILE.hull, spread=np.inf)))
+    u, uu = BASIS.terms.index("u_dot"), BASIS.terms.index("|u|u")
+    assert data.prior_spread[u, 0] == pytest.approx(IDENTIFY.unknown_mass_spread)
+    most = default_hull_spread(PROFILE, data.training_velocities)[COEFFICIENTS.index("X_|u|u")]
+    assert data.prior_spread[uu, 0] == pytest.approx(most)
+    assert data.ties == ()
+    assert data_of(logs).ties

@@ -36,7 +36,7 @@ class HullBaseline:
     @property
     def hull_known(self) -> bool:
         """True where the profile has a hull model, or there is a fitted one."""
-        return self.model is not None or self.profile.hull.has_model
+        return self.model is not None or self.profile.hull.is_known
 
     @property
     def sensors(self) -> Mapping[str, Mapping[str, Estimate]]:
@@ -61,7 +61,7 @@ class SimulationBaseline:
     @property
     def hull_known(self) -> bool:
         """True where the profile has a hull model."""
-        return self.simulated.measurements.profile.hull.has_model
+        return self.simulated.measurements.profile.hull.is_known
 
     @property
     def sensors(self) -> Mapping[str, Mapping[str, Estimate]]:
@@ -95,7 +95,7 @@ class CampaignBaseline:
     @property
     def hull_known(self) -> bool:
         """True where the profile has a hull model, or there is a fitted one."""
-        return self.model is not None or self.profile.hull.has_model
+        return self.model is not None or self.profile.hull.is_known
 
     @property
     def sensors(self) -> Mapping[str, Mapping[str, Estimate]]:

@@ -97,7 +97,7 @@ def assemble(
         return None
     members = _conditions_of_logs(members, [path in references for path in place])
     length, _, draught = dimensions(profile)
-    known = model is not None or profile.hull.has_model
+    known = model is not None or profile.hull.is_known
     size = np.zeros(len(INDUCED)) if known else induced_spread(length, draught)
     mean = np.concatenate([members[0].plain.hull, np.zeros(len(INDUCED))])
     spread = np.append(np.max(spreads, axis=0), size)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ferryid.effects.force_model import COEFFICIENTS, ForceModel, Measurements, hull_of
-from ferryid.effects.hull_spread import default_hull_spread
+from ferryid.effects.hull_spread import default_hull_spread, hull_model_spread
 from ferryid.effects.measurements import hull_force_model
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.errors import FerryIdError
@@ -41,8 +41,9 @@ def prior_force_model(
     ForceModel
         Without candidates.
     ndarray
-        Standard deviations, shape (26,), in the units of the coefficients: `EFFECTS.hull_spread` of each where a hull model
-        is known (with the model's own intervals added), and what a vessel of this size may have at most where it is not.
+        Standard deviations, shape (26,), in the units of the coefficients: those of `hull_model_spread` where a hull
+        model is known, of `EFFECTS.hull_spread` with the intervals of a fitted model, and what a vessel of this size may have
+        at most where none is known.
 
     Raises
     ------
@@ -53,8 +54,8 @@ def prior_force_model(
         return _modelled(measurements, profile, model, sha256)
     bare = hull_force_model(measurements, hull_of(profile))
     spread = (
-        EFFECTS.hull_spread * np.abs(bare.hull)
-        if profile.hull.has_model
+        hull_model_spread(profile) * np.abs(bare.hull)
+        if profile.hull.is_known
         else default_hull_spread(profile, measurements.nu[measurements.usable])
     )
     return replace(bare, external=measurements.air_load, ambient=lambda now: now.air_load), spread
@@ -92,7 +93,7 @@ def _modelled(measurements: Measurements, profile: Profile, model: Model, sha256
     plain = replace(known.plain(measurements), ambient=lambda now: known.plain(now).external)
     force_model = known.altered(plain, sha256).force_model
     spread = np.sqrt((EFFECTS.hull_spread * force_model.hull) ** 2 + known.variance)
-    if not known.force.profile.hull.has_model:
+    if not known.force.profile.hull.is_known:
         # What the base does not know, the fit had to learn; terms that it left out may be anything.
         spread = np.where(
             force_model.hull == 0.0, default_hull_spread(profile, measurements.nu[measurements.usable]), spread

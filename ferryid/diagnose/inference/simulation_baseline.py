@@ -29,7 +29,7 @@ from ferryid.diagnose.inference.weak_form import windows
 from ferryid.effects import effects
 from ferryid.effects.effect import Values
 from ferryid.effects.force_model import ForceModel, Measurements
-from ferryid.effects.thresholds import EFFECTS
+from ferryid.effects.hull_spread import hull_model_spread
 from ferryid.errors import FerryIdError
 from ferryid.types import IN_MEMORY, Floats, RunContext
 from ferryid.vessel.profile import Profile
@@ -105,7 +105,7 @@ def learn_simulation(path: str, profile: Profile, run: RunContext = IN_MEMORY) -
             "Fix: simulate and record the whole trial"
         )
     plain, spread = prior_force_model(simulated_windows.measurements, profile)
-    wide = INFERENCE.simulator_hull_factor * spread if profile.hull.has_model else spread
+    wide = INFERENCE.simulator_hull_factor * spread if profile.hull.is_known else spread
     run.progress(f"learning what {name} simulates")
     result = search(estimation_problem(simulated_windows, plain, wide), run.progress)
     made = result.fit
@@ -137,7 +137,7 @@ def learn_simulation(path: str, profile: Profile, run: RunContext = IN_MEMORY) -
         name,
         measurements,
         hull,
-        np.hypot(EFFECTS.hull_spread * hull, posterior * wide),
+        np.hypot(hull_model_spread(profile) * hull, posterior * wide),
         (*_measured(measurements), *conditions),
         sensors,
     )

@@ -121,7 +121,7 @@ def fit_disturbances(
     steps = problem.excerpt
     gaps = steps.gap(force_model)
     noise = fit_noise(steps, gaps, problem.filter)
-    known = problem.plain.measurements.profile.hull.has_model
+    known = problem.plain.measurements.profile.hull.is_known
     seen = [one for one in initial if not one.in_velocities]
     before = {one.candidate.key: one for one in seen}
     noise, states = _selected(steps, gaps, noise, candidates, force_model, minimum_gain, before, closely=known)

@@ -392,8 +392,8 @@ def log_notes(log: LogFigures) -> list[str]:
     notes = []
     if not log.hull_known and not log.joint:
         notes.append(
-            "The profile has no hull model: damping and added mass were fitted to this log beside the findings, which can "
-            "stand in for what a hull model would explain. Take them as hints, of probability "
+            "The profile has no hull model, or one of unknown spread: damping and added mass were fitted to this log beside "
+            "the findings, which can stand in for what a hull model would explain. Take them as hints, of probability "
             f"{JUDGING.hint_probability:g} at most, but for what sets in within the log and stands out."
         )
     if drowned := drowned_axes(log, noise_drowns_an_axis.threshold or 0.0):
