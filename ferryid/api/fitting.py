@@ -66,7 +66,7 @@ def fit(
     command
         The words that the page says it was asked for with.
     report
-        Write the page; without it the model alone is stored.
+        Write the page, also on a log that is refused; without it the model alone is stored.
     verify
         Read whole files and check every checksum.
     announce
@@ -87,14 +87,11 @@ def fit(
             vessel_of_archive(run.out, vessel, announce), settings, run, paths, name=name, page=report
         )
     profile = chosen_vessel(paths, vessel, announce)
-    return shown_where_refused(
-        lambda: fit_and_report(paths, profile, settings, run, name=name, page=report),
-        "fitted",
-        paths,
-        profile,
-        run,
-        command,
-    )
+
+    def fitted() -> FitReport:
+        return fit_and_report(paths, profile, settings, run, name=name, page=report)
+
+    return shown_where_refused(fitted, "fitted", paths, profile, run, command) if report else fitted()
 
 
 def evaluate(

@@ -8,7 +8,9 @@ from typing import NoReturn
 import numpy as np
 import pytest
 
+from ferryid.api import fit
 from ferryid.errors import FerryIdError, UnwritableError
+from ferryid.identify import FitSettings
 from ferryid.report import refusal_page
 from ferryid.report.held_signals import held_log
 from ferryid.report.interactive import available
@@ -104,3 +106,14 @@ def test_a_page_that_cannot_be_made_leaves_the_error_as_it_was(tmp_path: Path, m
     assert shown(error, tmp_path) == str(error)
     monkeypatch.setattr(refusal_page, "held_log", refusing(ZeroDivisionError("a bug")))
     assert shown(error, tmp_path / "other") == str(error)
+
+
+@pytest.mark.slow
+def test_a_fit_without_a_report_draws_no_log_that_it_refuses(tmp_path: Path) -> None:
+    few = FitSettings(weak_window_s=300.0, estimator="weak")
+    with pytest.raises(FerryIdError, match="is drawn in"):
+        fit(LOG, "milliampere", few, tmp_path / "drawn")
+    with pytest.raises(FerryIdError) as caught:
+        fit(LOG, "milliampere", few, tmp_path / "alone", report=False)
+    assert "is drawn in" not in str(caught.value)
+    assert not list((tmp_path / "alone").rglob("*.html"))
