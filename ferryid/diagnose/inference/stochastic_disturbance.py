@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from math import inf, log
 from typing import NamedTuple
 
@@ -34,6 +35,9 @@ START_STRENGTHS, START_FREQUENCIES = (0.3, 1.0), (0.5, 0.7, 1.0, 1.4, 2.0)
 GIVEN_WAY = 0.3
 """Share of its own coloured error and push that a channel keeps where a search begins beside less of them: strong waves have
 made its noise theirs, and beside that noise nothing is likelier than the weakest."""
+
+GROWTH_ROUNDS = 4
+"""Most times that a growth and the rest of a disturbance are estimated in turns."""
 
 
 @dataclass(frozen=True)
@@ -308,6 +312,15 @@ def _with_course(
     growth, likely = likeliest_growth(steps, gaps, lambda one: noise_in(one, fitted.channels, state.values))
     if likely - growth.cost(n) > found.after - found.state.course.cost(n):
         found = better_in(growth, found)
+    for _ in range(GROWTH_ROUNDS):
+        course, channels, values = found.state.course, found.noise.channels, found.state.values
+        if course.growth == 1.0:
+            break
+        # What waves of even strength had left to the noise made the growth look smaller.
+        growth, _ = likeliest_growth(steps, gaps, partial(noise_in, channels=channels, values=values))
+        found = better_in(growth, found)
+        if found.state.course == course:
+            break
     if found.state.course.ends:
         found = better_in(span_of(found.noise.channels, found.state.values), found)
     if found.state.course == ALL_ALONG:
