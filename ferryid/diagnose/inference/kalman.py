@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ferryid.compiled import borrowing, compiled
-from ferryid.types import Floats
+from ferryid.types import Floats, Ints
 
 CHANNEL_STATES = 5
 """States of a channel: position, velocity, measurement error, its rate, disturbance."""
@@ -385,10 +385,217 @@ def errors_alone(K: Floats, spread: Floats, noise: Floats, integrals: int, step_
 
 
 @compiled
-def predictions_alone(
-    scale: Floats, noises: Floats, integrals: int, step_s: float, series: Floats
+def gains_alone(
+    scale: Floats, noise: Floats, integrals: int, step_s: float, runs: Ints, n: int
 ) -> tuple[Floats, Floats]:
-    """Return whitened prediction errors of a channel's series, and their scale, under each of several noises.
+    """Return `gains` of channels that share no disturbance, in all series of a trial.
+
+    Parameters
+    ----------
+    scale, noise, integrals, step_s
+        As given to `gains`, of c channels.
+    runs
+        First row of every series and the one after its last, shape (runs, 2).
+    n
+        Rows of all series.
+
+    Returns
+    -------
+    ndarray
+        Gains of each channel's own states, shape (n, c, 5).
+    ndarray
+        Standard deviation of every prediction, shape (n, c).
+    """
+    c, longest = noise.shape[0], 0
+    for run in range(runs.shape[0]):
+        longest = max(longest, runs[run, 1] - runs[run, 0])
+    blocks, drive, columns = np.empty((0, 0)), np.empty((2, 0, 0)), np.empty((longest, 1, 0))
+    K, spread = np.zeros((n, c, CHANNEL_STATES)), np.ones((n, c))
+    for j in range(c):
+        # Every series begins alike: the longest has the gains of all.
+        own, scales = gains(scale[j : j + 1], noise[j : j + 1], integrals, blocks, drive, columns, step_s)
+        for run in range(runs.shape[0]):
+            first = runs[run, 0]
+            for k in range(first, runs[run, 1]):
+                spread[k, j] = scales[k - first, 0]
+                for i in range(CHANNEL_STATES):
+                    K[k, j, i] = own[k - first, 0, i]
+    return K, spread
+
+
+@compiled
+def whitened_alone(
+    gaps: Floats, runs: Ints, K: Floats, spread: Floats, noise: Floats, integrals: int, step_s: float
+) -> Floats:
+    """Return whitened prediction errors of accelerations in channels that share no disturbance.
+
+    `errors_alone` of what they are `summed` up to, in one pass and channel by channel; those of the first steps of every
+    series, which only tell where it starts, are zero.
+
+    Parameters
+    ----------
+    gaps
+        Shape (n, c, q).
+    runs, K, spread
+        As given to `gains_alone`, and from it.
+    noise, integrals, step_s
+        As given to it.
+
+    Returns
+    -------
+    ndarray
+        Shape (n, c, q).
+    """
+    n, c, q = gaps.shape
+    out, keep = np.zeros((n, c, q)), kept(noise, step_s)
+    h, half = step_s, 0.5 * step_s * step_s
+    if q == 1:
+        # States that stay in registers.
+        for run in range(runs.shape[0]):
+            first = runs[run, 0]
+            for j in range(c):
+                a, b, d, e, fade = keep[j, 0], keep[j, 1], keep[j, 2], keep[j, 3], keep[j, 4]
+                reached, way, p, v, w, r, u = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+                for k in range(first, runs[run, 1]):
+                    reached += gaps[k, j, 0]
+                    there = reached * h
+                    if integrals == 2:
+                        way += there
+                        there = way * h
+                    error = there - (p if integrals == 2 else v) - w
+                    if k >= first + DIFFUSE:
+                        out[k, j, 0] = error / spread[k, j]
+                    p += K[k, j, 0] * error
+                    v += K[k, j, 1] * error
+                    w += K[k, j, 2] * error
+                    r += K[k, j, 3] * error
+                    u += K[k, j, 4] * error
+                    p += h * v + half * u
+                    v += h * u
+                    w, r = a * w + b * r, d * w + e * r
+                    u *= fade
+        return out
+    series, total, moved = np.empty(q), np.empty(q), np.empty(q)
+    place, speed, wrong, rate, push = np.empty(q), np.empty(q), np.empty(q), np.empty(q), np.empty(q)
+    for run in range(runs.shape[0]):
+        first = runs[run, 0]
+        for j in range(c):
+            a, b, d, e, fade = keep[j, 0], keep[j, 1], keep[j, 2], keep[j, 3], keep[j, 4]
+            for m in range(q):
+                total[m], moved[m], place[m], speed[m] = 0.0, 0.0, 0.0, 0.0
+                wrong[m], rate[m], push[m] = 0.0, 0.0, 0.0
+            begun = 0
+            for k in range(first, runs[run, 1]):
+                # One that has not begun, as of a candidate that acts later, has nothing to predict.
+                for m in range(q - 1, begun - 1, -1):
+                    if gaps[k, j, m] != 0.0:
+                        begun = m + 1
+                        break
+                for m in range(begun):
+                    total[m] += gaps[k, j, m]
+                    series[m] = total[m] * h
+                if integrals == 2:
+                    for m in range(begun):
+                        moved[m] += series[m]
+                        series[m] = moved[m] * h
+                to_place, to_speed, to_wrong, to_rate, to_push = (
+                    K[k, j, 0],
+                    K[k, j, 1],
+                    K[k, j, 2],
+                    K[k, j, 3],
+                    K[k, j, 4],
+                )
+                share = spread[k, j]
+                for m in range(begun):
+                    # Read all, then write all: only so is this loop vectorised.
+                    p, v, w, r, u = place[m], speed[m], wrong[m], rate[m], push[m]
+                    error = series[m] - (p if integrals == 2 else v) - w
+                    series[m] = error / share
+                    v, w, r, u = v + to_speed * error, w + to_wrong * error, r + to_rate * error, u + to_push * error
+                    place[m] = p + to_place * error + (h * v + half * u)
+                    speed[m] = v + h * u
+                    wrong[m] = a * w + b * r
+                    rate[m] = d * w + e * r
+                    push[m] = fade * u
+                if k >= first + DIFFUSE:
+                    for m in range(begun):
+                        out[k, j, m] = series[m]
+    return out
+
+
+@compiled
+def gains_together(
+    scale: Floats,
+    noise: Floats,
+    integrals: int,
+    blocks: Floats,
+    drive: Floats,
+    columns: Floats,
+    step_s: float,
+    runs: Ints,
+) -> tuple[Floats, Floats]:
+    """Return `gains` of channels that share disturbances, in all series of a trial.
+
+    Parameters
+    ----------
+    scale, noise, integrals, blocks, drive, columns, step_s
+        As given to `gains`, of all rows.
+    runs
+        First row of every series and the one after its last, shape (runs, 2).
+
+    Returns
+    -------
+    ndarray
+        Gains, shape (n, c, S).
+    ndarray
+        Standard deviation of every prediction, shape (n, c).
+    """
+    n, c, s = columns.shape
+    K, spread = np.zeros((n, c, CHANNEL_STATES * c + s)), np.ones((n, c))
+    for run in range(runs.shape[0]):
+        first, end = runs[run, 0], runs[run, 1]
+        K[first:end], spread[first:end] = gains(scale, noise, integrals, blocks, drive, columns[first:end], step_s)
+    return K, spread
+
+
+@compiled
+def whitened_together(
+    gaps: Floats,
+    runs: Ints,
+    K: Floats,
+    spread: Floats,
+    noise: Floats,
+    integrals: int,
+    blocks: Floats,
+    columns: Floats,
+    step_s: float,
+) -> Floats:
+    """Return whitened prediction errors of accelerations, shape (n, c, q); as `whitened_alone`, of all channels together.
+
+    Parameters
+    ----------
+    gaps
+        Shape (n, c, q).
+    runs, noise, integrals, blocks, columns, step_s
+        As given to `gains_together`.
+    K, spread
+        From it.
+    """
+    out = np.zeros(gaps.shape)
+    for run in range(runs.shape[0]):
+        first, end = runs[run, 0], runs[run, 1]
+        series = summed(gaps[first:end], integrals, step_s)
+        given = K[first:end], spread[first:end], noise, integrals, blocks, columns[first:end], step_s, series
+        left = _errors_of_few(*given) if gaps.shape[2] <= FEW else _errors_of_many(*given)
+        out[first + DIFFUSE : end] = left[DIFFUSE:]
+    return out
+
+
+@compiled
+def predictions_alone(
+    scale: Floats, noises: Floats, integrals: int, step_s: float, gaps: Floats, runs: Ints
+) -> tuple[Floats, Floats]:
+    """Return whitened prediction errors of channels with the same noise, and their scale, under each of several noises.
 
     Parameters
     ----------
@@ -396,22 +603,31 @@ def predictions_alone(
         As given to `gains`.
     noises
         Each as given to it, shape (p, 5).
-    series
-        Positions or velocities, all with the same noise, shape (n, q).
+    gaps
+        Accelerations, shape (n, 1, q).
+    runs
+        First row of every series and the one after its last, shape (runs, 2).
 
     Returns
     -------
     ndarray
-        Whitened errors, shape (p, n, q); those of the first steps, which only tell where a series starts, are zero.
+        Whitened errors, shape (p, n, q); those of the first steps of every series, which only tell where it starts, are zero.
     ndarray
-        Logarithm of the standard deviation of every prediction, shape (p, n); zero for the first steps.
+        Logarithm of the standard deviation of every prediction, shape (p, n, q); zero for the first steps.
     """
-    n, q = series.shape
-    whitened, log_scales = np.zeros((len(noises), n, q)), np.zeros((len(noises), n))
-    blocks, drive, columns = np.empty((0, 0)), np.empty((2, 0, 0)), np.empty((n, 1, 0))
+    n, q = gaps.shape[0], gaps.shape[2]
+    whitened, log_scales = np.empty((len(noises), n, q)), np.zeros((len(noises), n, q))
     for i in range(len(noises)):
         noise = noises[i : i + 1]
-        K, spread = gains(scale, noise, integrals, blocks, drive, columns, step_s)
-        whitened[i, DIFFUSE:] = errors_alone(K, spread, noise, integrals, step_s, series)[DIFFUSE:]
-        log_scales[i, DIFFUSE:] = np.log(spread[DIFFUSE:, 0])
+        K, spread = gains_alone(scale, noise, integrals, step_s, runs, n)
+        whitened[i] = whitened_alone(gaps, runs, K, spread, noise, integrals, step_s)[:, 0]
+        for run in range(runs.shape[0]):
+            last, size = 0.0, 0.0
+            for k in range(runs[run, 0] + DIFFUSE, runs[run, 1]):
+                # Most are alike.
+                if spread[k, 0] != last:
+                    last = spread[k, 0]
+                    size = np.log(last)
+                for m in range(q):
+                    log_scales[i, k, m] = size
     return whitened, log_scales

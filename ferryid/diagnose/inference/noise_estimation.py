@@ -17,7 +17,6 @@ from ferryid.diagnose.inference.noise_model import (
     make_whitening_filter,
     measured_sizes,
     stride_s,
-    summed_up,
 )
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
@@ -63,14 +62,12 @@ def fit_noise(steps: Windows, gaps: Floats, initial: NoiseModel | None = None) -
     channels = np.empty((gaps.shape[1], 5))
     for group in sorted(set(GROUPS)):
         own = [j for j, g in enumerate(GROUPS) if g == group]
-        series = [summed_up(gaps[a:b][:, own], steps) for a, b in steps.runs]
-        size = scale[own].mean(keepdims=True)
+        # Channels that share a noise are series of one channel.
+        left, size = np.ascontiguousarray(gaps[:, None, own]), scale[own].mean(keepdims=True)
 
-        def predictions(z: Floats, series: list[Floats] = series, size: Floats = size) -> Predictions:
-            every = [predictions_alone(size, np.exp(z), integrals, h, part) for part in series]
-            whitened, log_scales = (np.concatenate(part, axis=1) for part in zip(*every, strict=True))
-            scales = np.broadcast_to(log_scales[:, :, None], whitened.shape)
-            return whitened.reshape(len(z), -1), scales.reshape(len(z), -1)
+        def predictions(z: Floats, left: Floats = left, size: Floats = size) -> Predictions:
+            whitened, log_scales = predictions_alone(size, np.exp(z), integrals, h, left, steps.ends)
+            return whitened.reshape(len(z), -1), log_scales.reshape(len(z), -1)
 
         rms = float(np.sqrt(np.mean(gaps[:, own] ** 2)))
         # The second difference of a position has six times the variance of its errors, the first of a velocity's twice.

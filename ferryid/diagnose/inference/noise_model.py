@@ -10,11 +10,18 @@ are states of the filter instead of being forced into the hull's coefficients.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import cos, exp, pi, sin
 
 import numpy as np
 
-from ferryid.diagnose.inference.kalman import DIFFUSE, errors, errors_alone, gains, summed
+from ferryid.diagnose.inference.kalman import (
+    DIFFUSE,
+    gains_alone,
+    gains_together,
+    whitened_alone,
+    whitened_together,
+)
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.effects.effect import Process
 from ferryid.effects.force_model import ForceModel
@@ -41,55 +48,54 @@ class NoiseModel:
 
 
 @dataclass(frozen=True)
-class Part:
-    """Channels that are filtered together: which, their noise, shared states, and the gains of every series."""
+class WhiteningFilter:
+    """A filter with its gains for the steps of one trial; see `make_whitening_filter`.
 
-    channels: tuple[int, ...]
+    Attributes
+    ----------
+    steps
+        Those of the trial.
+    noise
+        Of each channel, shape (c, 5).
+    blocks, columns
+        Transition of the shared states, shape (s, s), and what a unit of each accelerates, shape (J, c, s).
+    gains, spread
+        Gains of all steps, shape (J, c, states), and standard deviations of the predictions, shape (J, c).
+    """
+
+    steps: Windows
     noise: Floats
     blocks: Floats
     columns: Floats
-    gains: tuple[tuple[Floats, Floats], ...] = field(repr=False)
-
-
-@dataclass(frozen=True)
-class WhiteningFilter:
-    """A filter with its gains for the steps of one trial; see `make_whitening_filter`."""
-
-    steps: Windows
-    parts: tuple[Part, ...]
+    gains: Floats = field(repr=False)
+    spread: Floats = field(repr=False)
 
     def white(self, gaps: Floats) -> Floats:
         """Return whitened prediction errors of gaps, shape (J, c) flat, or (J, c, q) with q columns.
 
         The first steps of every series only tell where it starts, and are zero.
         """
-        left = np.empty((*gaps.shape[:2], 1 if gaps.ndim == 2 else gaps.shape[2]))
-        integrals, h = integrals_of(self.steps), stride_s(self.steps)
-        for part in self.parts:
-            own = list(part.channels)
-            for (first, end), (K, spread) in zip(self.steps.runs, part.gains, strict=True):
-                series = summed_up(gaps[first:end][:, own].reshape(end - first, len(own), -1), self.steps)
-                if not part.blocks.size:
-                    errors_ = errors_alone(K, spread, part.noise, integrals, h, series[:, 0])[:, None]
-                else:
-                    columns = part.columns[first:end]
-                    errors_ = errors(K, spread, part.noise, integrals, part.blocks, columns, h, series)
-                errors_[:DIFFUSE] = 0.0
-                left[first:end, own] = errors_
-        return np.ascontiguousarray(left.reshape(-1) if gaps.ndim == 2 else left.reshape(-1, gaps.shape[2]))
+        every = np.ascontiguousarray(gaps, dtype=np.float64).reshape(*gaps.shape[:2], -1)
+        integrals, h, runs = integrals_of(self.steps), stride_s(self.steps), self.steps.ends
+        if self.blocks.size:
+            left = whitened_together(
+                every, runs, self.gains, self.spread, self.noise, integrals, self.blocks, self.columns, h
+            )
+        else:
+            left = whitened_alone(every, runs, self.gains, self.spread, self.noise, integrals, h)
+        return left.reshape(-1) if gaps.ndim == 2 else left.reshape(-1, every.shape[2])
 
-    @property
+    @cached_property
     def log_scale(self) -> float:
         """Sum of the logarithms of the standard deviations of all predictions."""
-        return sum(float(np.log(spread[DIFFUSE:]).sum()) for part in self.parts for _, spread in part.gains)
+        return float(self.log_scales.sum())
 
-    @property
+    @cached_property
     def log_scales(self) -> Floats:
         """Logarithms of the standard deviations of all predictions, shape (J, c); zero for those that are not judged."""
-        every = np.zeros((len(self.steps.starts), sum(len(part.channels) for part in self.parts)))
-        for part in self.parts:
-            for (first, end), (_, spread) in zip(self.steps.runs, part.gains, strict=True):
-                every[first + DIFFUSE : end, list(part.channels)] = np.log(spread[DIFFUSE:])
+        every = np.log(self.spread)
+        for first, end in self.steps.runs:
+            every[first : min(first + DIFFUSE, end)] = 0.0
         return every
 
 
@@ -98,24 +104,15 @@ def make_whitening_filter(noise: NoiseModel, steps: Windows, responses: Floats |
 
     `responses` are those of `disturbance_columns`, where they are known already.
     """
-    h, integrals = stride_s(steps), integrals_of(steps)
-    scale = measured_sizes(steps)
+    h, integrals, scale = stride_s(steps), integrals_of(steps), measured_sizes(steps)
+    channels = np.ascontiguousarray(noise.channels)
     if noise.processes and noise.force_model is not None:
-        columns = disturbance_columns(noise, steps) if responses is None else responses
+        columns = np.ascontiguousarray(disturbance_columns(noise, steps) if responses is None else responses)
         blocks, drive = _blocks(noise.processes, h)
-        by_run = tuple(
-            gains(scale, noise.channels, integrals, blocks, drive, np.ascontiguousarray(columns[a:b]), h)
-            for a, b in steps.runs
-        )
-        return WhiteningFilter(
-            steps, (Part(tuple(range(len(noise.channels))), noise.channels, blocks, columns, by_run),)
-        )
-    parts = []
-    for j in range(len(noise.channels)):
-        own = noise.channels[j : j + 1]
-        by_run = tuple(_alone(scale[j : j + 1], own, integrals, b - a, h) for a, b in steps.runs)
-        parts.append(Part((j,), own, np.empty((0, 0)), _no_columns(len(steps.starts)), by_run))
-    return WhiteningFilter(steps, tuple(parts))
+        found = gains_together(scale, channels, integrals, blocks, drive, columns, h, steps.ends)
+        return WhiteningFilter(steps, channels, blocks, columns, *found)
+    found = gains_alone(scale, channels, integrals, h, steps.ends, len(steps.starts))
+    return WhiteningFilter(steps, channels, np.empty((0, 0)), np.empty((len(steps.starts), len(channels), 0)), *found)
 
 
 def disturbance_columns(noise: NoiseModel, steps: Windows) -> Floats:
@@ -147,25 +144,11 @@ def stride_s(steps: Windows) -> float:
     return (len(steps.weight) - 1) // integrals_of(steps) * steps.measurements.step_s
 
 
-def summed_up(gaps: Floats, steps: Windows) -> Floats:
-    """Return the gaps of one series, shape (J, c) or (J, c, q), as what they sum up to in position or velocity."""
-    flat = np.ascontiguousarray(gaps).reshape(*gaps.shape[:2], -1)
-    return summed(flat, integrals_of(steps), stride_s(steps)).reshape(gaps.shape)
-
-
 def measured_sizes(steps: Windows) -> Floats:
     """Return the root mean square of what is measured in every channel, in position or velocity, shape (c,)."""
-    measured = steps.measured[:, steps.channels]
+    measured = steps.measured_channels
     size = np.sqrt(np.mean(measured**2, axis=0)) * stride_s(steps) ** integrals_of(steps)
     return np.asarray(np.maximum(size, 1e-9))
-
-
-def _no_columns(n: int) -> Floats:
-    return np.empty((n, 1, 0))
-
-
-def _alone(scale: Floats, noise: Floats, integrals: int, n: int, h: float) -> tuple[Floats, Floats]:
-    return gains(scale, noise, integrals, np.empty((0, 0)), np.empty((2, 0, 0)), _no_columns(n), h)
 
 
 def _blocks(processes: tuple[Process, ...], h: float) -> tuple[Floats, Floats]:

@@ -76,6 +76,11 @@ class Windows:
         return gaps
 
     @cached_property
+    def ends(self) -> Ints:
+        """The runs as an array, shape (runs, 2)."""
+        return np.array(self.runs, dtype=np.int64).reshape(-1, 2)
+
+    @cached_property
     def measured_channels(self) -> Floats:
         """Measured accelerations of the channels that are used, shape (J, channels)."""
         return self.measured[:, self.channels]

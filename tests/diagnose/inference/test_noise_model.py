@@ -149,19 +149,21 @@ def test_accelerations_sum_up_to_velocities_and_positions(integrals: int) -> Non
 
 @pytest.mark.parametrize("integrals", [2, 1], ids=["positions", "velocities"])
 def test_predictions_under_several_noises_are_those_of_each_alone(integrals: int) -> None:
-    n, h, scale = 80, 0.4, np.array([0.7])
-    series = 0.02 * np.cumsum(np.random.default_rng(6).standard_normal((n, 2)), axis=0)
+    h, scale, runs = 0.4, np.array([0.7]), np.array([[0, 80], [80, 110]])
+    gaps = 0.02 * np.random.default_rng(6).standard_normal((110, 1, 2))
     noises = np.stack([TRUE[0], TRUE[2], OTHER[1]])
-    whitened, log_scales = predictions_alone(scale, noises, integrals, h, series)
+    every = predictions_alone(scale, noises, integrals, h, gaps, runs)
     for k, row in enumerate(noises[:, None]):
-        none, nothing = np.empty((0, 0)), np.empty((n, 1, 0))
-        K, spread = gains(scale, row, integrals, none, np.empty((2, 0, 0)), nothing, h)
-        left = errors_alone(K, spread, row, integrals, h, series)
-        assert np.ptp(left) > 1.0
-        np.testing.assert_allclose(whitened[k, DIFFUSE:], left[DIFFUSE:], rtol=1e-12)
-        np.testing.assert_allclose(log_scales[k, DIFFUSE:], np.log(spread[DIFFUSE:, 0]), rtol=1e-12)
-        assert not whitened[k, :DIFFUSE].any()
-        assert not log_scales[k, :DIFFUSE].any()
+        for a, b in runs.tolist():
+            none, nothing = np.empty((0, 0)), np.empty((b - a, 1, 0))
+            K, spread = gains(scale, row, integrals, none, np.empty((2, 0, 0)), nothing, h)
+            left = errors_alone(K, spread, row, integrals, h, summed(gaps[a:b], integrals, h)[:, 0])
+            whitened, log_scales = (one[k, a:b] for one in every)
+            assert np.ptp(left) > 1.0
+            np.testing.assert_allclose(whitened[DIFFUSE:], left[DIFFUSE:], rtol=1e-12)
+            np.testing.assert_allclose(log_scales[DIFFUSE:], np.log(spread[DIFFUSE:]) * [[1.0, 1.0]], rtol=1e-12)
+            assert not whitened[:DIFFUSE].any()
+            assert not log_scales[:DIFFUSE].any()
 
 
 @pytest.mark.parametrize("placed", [True, False], ids=["positions", "velocities"])
