@@ -19,6 +19,10 @@ it moves with the angle [m/rad]."""
 EIGHTH, SIXTEENTH, THREE_SIXTEENTHS = math.pi / 8.0, math.tan(math.pi / 16.0), math.tan(3.0 * math.pi / 16.0)
 """An eighth of a half turn [rad], and tangents of half of it and of one and a half of it."""
 TANGENT_EIGHTH = math.tan(math.pi / 8.0)
+LEAST = 2.2250738585072014e-308
+"""Least normal number: what may be zero is divided by this at least."""
+BLOCK = 512
+"""Rows at a time: what is worked out of them stays in the cache."""
 
 
 def steady_wind_force(
@@ -58,43 +62,47 @@ def angle(a: float, b: float) -> float:
     The ratio of the smaller to the larger is brought within a sixteenth of a half turn of none, an eighth or a quarter of it;
     there ten terms of Taylor's series are enough.
     """
-    large, small = max(a, abs(b)), min(a, abs(b))
-    near, tangent = 0.0, 0.0
-    if small > SIXTEENTH * large:
-        near, tangent = EIGHTH, TANGENT_EIGHTH
-    if small > THREE_SIXTEENTHS * large:
-        near, tangent = 2.0 * EIGHTH, 1.0
-    x = (small - tangent * large) / max(large + tangent * small, 2.2250738585072014e-308)
+    size = abs(b)
+    large, small = max(a, size), min(a, size)
+    # Choices of a value, and divisions that never raise: only so are loops that call it vectorised.
+    eighth, quarter = small > SIXTEENTH * large, small > THREE_SIXTEENTHS * large
+    near = 2.0 * EIGHTH if quarter else EIGHTH if eighth else 0.0
+    tangent = 1.0 if quarter else TANGENT_EIGHTH if eighth else 0.0
+    x = np.divide(small - tangent * large, max(large + tangent * small, LEAST))
     y = x * x
     series = y * (1.0 / 17.0 - y * (1.0 / 19.0 - y / 21.0))
     series = y * (1.0 / 9.0 - y * (1.0 / 11.0 - y * (1.0 / 13.0 - y * (1.0 / 15.0 - series))))
     series = y * (1.0 / 3.0 - y * (1.0 / 5.0 - y * (1.0 / 7.0 - series)))
     found = near + (x - x * series)
-    found = 0.5 * math.pi - found if a > abs(b) else found
-    return math.pi - found if b < 0.0 else found
-
-
-@borrowing
-def load(u: float, v: float, shape: Shape) -> tuple[float, float, float]:
-    """Return the load at a velocity relative to the air [m/s]."""
-    longitudinal, transverse, oblique, lever, moved = shape
-    square = u * u + v * v
-    sin_2gamma = 2.0 * u * v / max(square, 2.2250738585072014e-308)
-    pressure = -math.sqrt(square) / (1.0 - oblique * (sin_2gamma * sin_2gamma))
-    Y = transverse * pressure * v
-    return longitudinal * pressure * u, Y, (lever + moved * (0.5 * math.pi - angle(abs(v), u))) * Y
+    found = 0.5 * math.pi - found if a > size else found
+    return float(math.pi - found if b < 0.0 else found)
 
 
 @compiled
 def weighed_loads(winds: Floats, weights: Floats, cosine: Floats, sine: Floats, nu: Floats, shape: Shape) -> Floats:
     """Return `steady_wind_force`."""
-    out = np.empty((nu.shape[0], 3))
-    for i in range(nu.shape[0]):
-        c, s = cosine[i], sine[i]
-        X, Y, N = 0.0, 0.0, 0.0
+    longitudinal, transverse, oblique, lever, moved = shape
+    n = nu.shape[0]
+    out = np.empty((n, 3))
+    u, v, X, Y, N = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK)
+    for first in range(0, n, BLOCK):
+        rows = min(BLOCK, n - first)
+        c, s = cosine[first : first + rows], sine[first : first + rows]
+        for i in range(rows):
+            u[i], v[i] = nu[first + i, 0], nu[first + i, 1]
+            X[i], Y[i], N[i] = 0.0, 0.0, 0.0
         for w in range(winds.shape[0]):
-            along, across = c * winds[w, 0] + s * winds[w, 1], c * winds[w, 1] - s * winds[w, 0]
-            ahead, aside, turn = load(nu[i, 0] - along, nu[i, 1] - across, shape)
-            X, Y, N = X + weights[w] * ahead, Y + weights[w] * aside, N + weights[w] * turn
-        out[i, 0], out[i, 1], out[i, 2] = X, Y, N
+            north, east, weight = winds[w, 0], winds[w, 1], weights[w]
+            for i in range(rows):
+                # Velocity relative to the air.
+                ahead, aside = u[i] - (c[i] * north + s[i] * east), v[i] - (c[i] * east - s[i] * north)
+                square = ahead * ahead + aside * aside
+                sin_2gamma = np.divide(2.0 * ahead * aside, max(square, LEAST))
+                pressure = np.divide(-math.sqrt(square), 1.0 - oblique * (sin_2gamma * sin_2gamma))
+                push = transverse * pressure * aside
+                X[i] += weight * (longitudinal * pressure * ahead)
+                Y[i] += weight * push
+                N[i] += weight * ((lever + moved * (0.5 * math.pi - angle(abs(aside), ahead))) * push)
+        for i in range(rows):
+            out[first + i, 0], out[first + i, 1], out[first + i, 2] = X[i], Y[i], N[i]
     return out

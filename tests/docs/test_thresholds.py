@@ -62,6 +62,7 @@ NO_DECISION = {
         effects.wind COEFFICIENTS
     """,
     "rounding, overflow and division by zero": """
+        effects.wind_loads LEAST
         signals.grid EXACT_S
         diagnose.second_sources.comparison _SAME
         diagnose.second_sources.samples _ROUNDING
@@ -171,6 +172,7 @@ NO_DECISION = {
         identify.window_length TRAINING_LENGTHS
         models.forces.estimator CHUNK_ROWS
         effects.shallow_water MOST_VALUES
+        effects.wind_loads BLOCK
         effects.wind KEPT
         models.forces.residual _RUNS
         models.prediction.free_run MAX_STARTS
