@@ -121,7 +121,7 @@ NO_DECISION = {
         diagnose.inference.estimation MAX_ITERATIONS HULL_SLOPE_ITERATIONS CONVERGED_GAIN HULL_DIFFERENCE DAMPINGS
         diagnose.inference.estimation PARAMETER_DIFFERENCE LONGEST_STEP
         diagnose.judging.held_out IMITATION_STEPS IMITATION_DIFFERENCE
-        diagnose.inference.kalman CONVERGED FEW
+        diagnose.inference.kalman CONVERGED FEW WIDE
         diagnose.inference.noise_estimation START_SHARES DIFFERENCE_STEP FIRST_DAMPING LEAST_DAMPING LARGEST_DAMPING
         diagnose.inference.noise_estimation LONGEST_STEP SUFFICIENT_GAIN SEARCHED_STEPS
         diagnose.inference.onset_estimation FIRST_TIME_STEP_S LAST_TIME_STEP_S COMPARING_ITERATIONS

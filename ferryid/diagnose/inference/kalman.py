@@ -18,18 +18,24 @@ CONVERGED = 1e-9
 """Change of gains, as a share of the largest, below which they stay as they are."""
 FEW = 5
 """Series up to which `errors` takes them one after the other."""
+WIDE = 48
+"""States of a filter for which its loops are compiled; with more it is slower."""
 DIFFUSE = 2
 """Steps after which position and velocity are known."""
 
 
-@compiled
-def advance(x: Floats, keep: Floats, blocks: Floats, columns: Floats, k: int, step_s: float, scratch: Floats) -> None:
-    """Move states, shape (S, q), on by a step, in place.
+@borrowing
+def move_on(
+    x: Floats, q: int, keep: Floats, blocks: Floats, columns: Floats, k: int, step_s: float, scratch: Floats
+) -> None:
+    """Move q columns of states on by a step, in place.
 
     Parameters
     ----------
     x
-        States of all channels, then the shared ones.
+        States of all channels, then the shared ones, shape (S, q or more).
+    q
+        Columns to move.
     keep
         Of each channel: what moves the error and its rate on, row by row, and what is kept of the disturbance, shape (c, 5).
     blocks
@@ -41,9 +47,9 @@ def advance(x: Floats, keep: Floats, blocks: Floats, columns: Floats, k: int, st
     step_s
         Step [s].
     scratch
-        Room for the shared states, shape (s, q).
+        Room for the shared states, shape (s, q or more).
     """
-    c, s, q = columns.shape[1], columns.shape[2], x.shape[1]
+    c, s = columns.shape[1], columns.shape[2]
     h, half = step_s, 0.5 * step_s * step_s
     for j in range(c):
         i = CHANNEL_STATES * j
@@ -53,13 +59,15 @@ def advance(x: Floats, keep: Floats, blocks: Floats, columns: Floats, k: int, st
             if part != 0.0:
                 for m in range(q):
                     x[i, m] += half * (part * x[CHANNEL_STATES * c + b, m])
+        first, second, third, fourth, fade = keep[j, 0], keep[j, 1], keep[j, 2], keep[j, 3], keep[j, 4]
         for m in range(q):
-            speed, wrong, rate, push = x[i + 1, m], x[i + 2, m], x[i + 3, m], x[i + 4, m]
-            x[i, m] += h * speed + half * push
+            # Read all, then write all: only so is this loop vectorised.
+            place, speed, wrong, rate, push = x[i, m], x[i + 1, m], x[i + 2, m], x[i + 3, m], x[i + 4, m]
+            x[i, m] = place + (h * speed + half * push)
             x[i + 1, m] = speed + h * push
-            x[i + 2, m] = keep[j, 0] * wrong + keep[j, 1] * rate
-            x[i + 3, m] = keep[j, 2] * wrong + keep[j, 3] * rate
-            x[i + 4, m] = keep[j, 4] * push
+            x[i + 2, m] = first * wrong + second * rate
+            x[i + 3, m] = third * wrong + fourth * rate
+            x[i + 4, m] = fade * push
         for b in range(s):
             part = columns[k, j, b]
             if part != 0.0:
@@ -80,7 +88,7 @@ def advance(x: Floats, keep: Floats, blocks: Floats, columns: Floats, k: int, st
 
 @compiled
 def kept(noise: Floats, step_s: float) -> Floats:
-    """Return what each channel keeps over a step; see `advance`. The error is critically damped, as a filter's is."""
+    """Return what each channel keeps over a step; see `move_on`. The error is critically damped, as a filter's is."""
     keep = np.empty((noise.shape[0], 5))
     for j in range(noise.shape[0]):
         x = step_s / noise[j, 2]
@@ -124,11 +132,57 @@ def gains(
     """
     n, c, s = columns.shape
     S = CHANNEL_STATES * c + s
-    h = step_s
-    known = 0 if integrals == 2 else 1
-    keep = kept(noise, h)
-    P, Q, turned = np.zeros((S, S)), np.zeros((S, S)), np.empty((S, S))
-    scratch, sights = np.empty((s, S)), np.empty((c, S))
+    K, spread, keep = np.zeros((n, c, S)), np.empty((n, c)), kept(noise, step_s)
+    if S <= WIDE:
+        # Rows at distances that are known when this is compiled: only so are loops over several of them vectorised.
+        P, Q, turned = np.zeros((S, WIDE)), np.zeros((S, WIDE)), np.zeros((S, WIDE))
+        sights, scratch = np.zeros((c, WIDE)), np.zeros((s, WIDE))
+        run_covariances(
+            scale, noise, integrals, blocks, drive, columns, step_s, keep, P, Q, turned, sights, scratch, K, spread
+        )
+    else:
+        P_, Q_, turned_ = np.zeros((S, S)), np.zeros((S, S)), np.zeros((S, S))
+        sights_, scratch_ = np.zeros((c, S)), np.zeros((s, S))
+        run_covariances(
+            scale, noise, integrals, blocks, drive, columns, step_s, keep, P_, Q_, turned_, sights_, scratch_, K, spread
+        )
+    return K, spread
+
+
+@borrowing
+def run_covariances(
+    scale: Floats,
+    noise: Floats,
+    integrals: int,
+    blocks: Floats,
+    drive: Floats,
+    columns: Floats,
+    step_s: float,
+    keep: Floats,
+    P: Floats,
+    Q: Floats,
+    turned: Floats,
+    sights: Floats,
+    scratch: Floats,
+    K: Floats,
+    spread: Floats,
+) -> None:
+    """Fill in gains and standard deviations, `K` and `spread` of `gains`.
+
+    Parameters
+    ----------
+    scale, noise, integrals, blocks, drive, columns, step_s
+        As given to it.
+    keep
+        From `kept`.
+    P, Q, turned, sights, scratch
+        Zeros, S columns of which are used: covariance, what enters over a step, room for P, shape (S, S or more), for what a
+        channel sees, shape (c, S or more), and for shared states, shape (s, S or more).
+    K, spread
+        Shapes (n, c, S) and (n, c).
+    """
+    n, c, s = columns.shape
+    S, h, known = CHANNEL_STATES * c + s, step_s, 0 if integrals == 2 else 1
     for j in range(c):
         i = CHANNEL_STATES * j
         vague = (1e3 * scale[j]) ** 2
@@ -147,7 +201,6 @@ def gains(
         for m in range(s):
             P[CHANNEL_STATES * c + i, CHANNEL_STATES * c + m] = drive[1, i, m]
             Q[CHANNEL_STATES * c + i, CHANNEL_STATES * c + m] = drive[0, i, m]
-    K, spread = np.zeros((n, c, S)), np.empty((n, c))
     for k in range(n):
         # One measurement after the other; what the ones before have told is taken off the rows that the next one looks at.
         for j in range(c):
@@ -161,18 +214,25 @@ def gains(
             variance = sights[j, at] + sights[j, wrong_] + noise[j, 0] * noise[j, 0]
             spread[k, j] = np.sqrt(variance)
             for i in range(S):
-                K[k, j, i] = sights[j, i] / variance
-        for i in range(S):
-            for j in range(c):
-                gain = K[k, j, i]
+                # NumPy's division does not look for zeros, at which a loop could not be vectorised.
+                K[k, j, i] = np.divide(sights[j, i], variance)
+        if c == 3:
+            for i in range(S):
+                first, second, third = K[k, 0, i], K[k, 1, i], K[k, 2, i]
                 for m in range(S):
-                    P[i, m] -= gain * sights[j, m]
+                    P[i, m] = P[i, m] - first * sights[0, m] - second * sights[1, m] - third * sights[2, m]
+        else:
+            for i in range(S):
+                for j in range(c):
+                    gain = K[k, j, i]
+                    for m in range(S):
+                        P[i, m] -= gain * sights[j, m]
         # F P F' by moving the columns, then the rows: P is symmetric.
-        advance(P, keep, blocks, columns, k, h, scratch)
+        move_on(P, S, keep, blocks, columns, k, h, scratch)
         for i in range(S):
             for m in range(S):
                 turned[m, i] = P[i, m]
-        advance(turned, keep, blocks, columns, k, h, scratch)
+        move_on(turned, S, keep, blocks, columns, k, h, scratch)
         for i in range(S):
             for m in range(i + 1):
                 P[i, m] = turned[i, m] + Q[i, m]
@@ -190,7 +250,6 @@ def gains(
                         for i in range(S):
                             K[rest, j, i] = K[k, j, i]
                 break
-    return K, spread
 
 
 def errors(
@@ -253,7 +312,7 @@ def _errors_of_few(
                 for i in range(S):
                     x[i] += K[k, j, i] * error
             for j in range(c):
-                # As `advance`.
+                # As `move_on`.
                 i = CHANNEL_STATES * j
                 place, speed, wrong, rate, push = x[i], x[i + 1], x[i + 2], x[i + 3], x[i + 4]
                 more = speed + h * push
@@ -304,7 +363,7 @@ def _errors_of_many(
                 gain = K[k, j, i]
                 for m in range(begun):
                     x[i, m] += gain * error[m]
-        advance(x, keep, blocks, columns, k, step_s, scratch)
+        move_on(x, begun, keep, blocks, columns, k, step_s, scratch)
     return out
 
 
