@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+from matplotlib.ticker import FuncFormatter, NullLocator
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
@@ -21,6 +21,7 @@ from ferryid.report.figures import (
     STYLE,
     SYMBOLS,
     UNITS,
+    LogTicks,
     canvas,
     legend_above,
     plain_log,
@@ -325,7 +326,7 @@ def _steps(ax: Axes, diagnosis: Diagnosis, edges: Floats, values: Mapping[str, F
         if name == "before" or diagnosis.findings:
             ax.stairs(values[name], edges, baseline=None, color=colour, linewidth=1.6, label=name)
     ax.set_yscale("log")
-    ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=5))
+    ax.yaxis.set_major_locator(LogTicks(subs=(1.0, 2.0, 5.0), numticks=5))
     ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     ax.yaxis.set_minor_locator(NullLocator())
 

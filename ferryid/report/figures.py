@@ -13,7 +13,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from numpy.typing import NDArray
 
 from ferryid.identify import ComponentCurve, Excitation, LogFit
@@ -28,6 +28,8 @@ MEASURED, BASE, NEW, SHADE = "#222222", "#d55e00", "#0072b2", "#e8eef4"
 UNITS = ("N", "N", "N·m")
 REACH = 8.0
 """Where the axis of the coefficient figure ends; a coefficient this far from zero is beyond doubt anyway."""
+EDGE = 1e-6
+"""Share by which a tick may lie beyond the limits of a logarithmic axis: at them it is drawn."""
 SYMBOLS = ("X", "Y", "N")
 STYLE: dict[Any, Any] = {
     "font.size": 10,
@@ -85,10 +87,23 @@ def legend_above(figure: Figure, ax: Axes, columns: int, title: str = "") -> Non
     )
 
 
+class LogTicks(LogLocator):
+    """Ticks of a logarithmic axis within its limits: one beyond them is not drawn, but takes as long to make."""
+
+    def tick_values(self, vmin: float, vmax: float) -> list[float]:
+        """Return the places of the ticks."""
+        values = np.asarray(super().tick_values(vmin, vmax), dtype=np.float64)
+        low, high = min(vmin, vmax), max(vmin, vmax)
+        inside: list[float] = values[(values >= low * (1.0 - EDGE)) & (values <= high * (1.0 + EDGE))].tolist()
+        return inside
+
+
 def plain_log(ax: Axes, *, x: bool, y: bool) -> None:
     """Label logarithmic axes as 1e-3, 1e0: typeset exponents take longer than all else on the page."""
     for wanted, axis in ((x, ax.xaxis), (y, ax.yaxis)):
         if wanted:
+            axis.set_major_locator(LogTicks())
+            axis.set_minor_locator(LogTicks(subs=None))
             axis.set_major_formatter(
                 FuncFormatter(lambda value, _: f"{value:.0e}".replace("e+0", "e").replace("e-0", "e-"))
             )
