@@ -70,8 +70,10 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
         return force_model
     air, factors = np.split(np.asarray(p, dtype=np.float64), [2])
     factors = factors if factors.size else np.ones(3)
-    more = factors * (mean_load(measurements, air, force_model.gust_std) - measurements.air_load)
-    return replace(force_model, external=force_model.external + more, air=air, air_factors=factors)
+    external = mean_load(measurements, air, force_model.gust_std) - measurements.air_load
+    external *= factors
+    external += force_model.external
+    return replace(force_model, external=external, air=air, air_factors=factors)
 
 
 def unreported(measurements: Measurements, p: Floats) -> frozenset[str]:

@@ -271,6 +271,8 @@ def fit(
     # The hull's derivatives cost most: they are taken anew only now and then, and before the fit ends.
     moving, by_hull, of_hull = (problem.origin if begin is None else begin).by_free_hull
     both, fresh = np.concatenate([moving, h + free]), False
+    square, many = np.ix_(both, both), len(moving)
+    products = np.empty((len(both), len(both)))
     for count in range(max(steps, 1)):
         if count > 0 and (bends or count % HULL_SLOPE_ITERATIONS == 0):
             by_hull, fresh = problem.hull_slopes(chain[-1])[:, moving], True
@@ -285,8 +287,10 @@ def fit(
             gaps = np.stack([problem.steps.gap(one) for one in there], axis=2)
             by_effects = (problem.whitening_filter.white(gaps) - w[:, None]) / d
         across = by_hull.T @ by_effects
+        products[:many, :many], products[:many, many:] = of_hull, across
+        products[many:, :many], products[many:, many:] = across.T, by_effects.T @ by_effects
         A = np.eye(h + q)
-        A[np.ix_(both, both)] += np.block([[of_hull, across], [across.T, by_effects.T @ by_effects]])
+        A[square] += products
         if count == steps:
             break
         lowest = np.concatenate([np.full(h, -np.inf), low - z[h:]])

@@ -17,7 +17,12 @@ def newton_step(A: Floats, slope: Floats, low: Floats, high: Floats) -> Floats:
     low, high
         Bounds of the step, shape (k,).
     """
-    step, free = np.zeros(len(slope)), np.ones(len(slope), dtype=np.bool_)
+    step = np.asarray(-np.linalg.solve(A, slope), dtype=np.float64)
+    beyond = (step < low) | (step > high)
+    if not beyond.any():
+        return step
+    free = ~beyond
+    step = np.where(beyond, np.clip(step, low, high), 0.0)
     while free.any():
         step[free] = -np.linalg.solve(A[np.ix_(free, free)], slope[free] + A[np.ix_(free, ~free)] @ step[~free])
         beyond = free & ((step < low) | (step > high))

@@ -64,14 +64,19 @@ class Windows:
 
     def mean(self, values: Floats) -> Floats:
         """Return ``∫ w f dt`` in every window, shape (J,) or (J, c), of values with n rows."""
-        return _means(values, self.weight, self.starts, self.measurements.step_s)
+        return _means(values, self.share, self.starts)
+
+    @cached_property
+    def share(self) -> Floats:
+        """Share of each row of a window in its mean, shape (m,)."""
+        return self.weight * self.measurements.step_s
 
     def gap(self, force_model: ForceModel) -> Floats:
         """Return the force model's acceleration less the measured one in every window, shape (J, channels)."""
         rates = as_measured(force_model)
         if self.channels[0]:
             over_ground(rates, self.measurements.nu, *self.measurements.pointing)
-        gaps = self.mean(rates)
+        gaps = weighed(rates, self.share, self.starts)
         gaps -= self.measured_channels
         return gaps
 
@@ -190,7 +195,10 @@ def windows(measurements: Measurements, length_s: float, stride_s: float) -> Win
     nu = np.where(np.isfinite(measurements.nu_raw), measurements.nu_raw, 0.0)
     _, slope, bend = window_weights(m * every, measurements.step_s)
     measured = np.hstack(
-        [_means(eta, bend, rows * every, measurements.step_s), -_means(nu, slope, rows * every, measurements.step_s)]
+        [
+            _means(eta, bend * measurements.step_s, rows * every),
+            -_means(nu, slope * measurements.step_s, rows * every),
+        ]
     )
     return Windows(thin, rows, tuple(runs), window_weights(m, thin.step_s)[0], measured, channels)
 
@@ -230,9 +238,9 @@ def steps_of(long: Windows) -> Windows:
     )
 
 
-def _means(values: Floats, weight: Floats, starts: NDArray[np.int64], step_s: float) -> Floats:
+def _means(values: Floats, weight: Floats, starts: NDArray[np.int64]) -> Floats:
     flat = np.ascontiguousarray(values, dtype=np.float64).reshape(len(values), -1)
-    return weighed(flat, weight * step_s, starts).reshape(len(starts), *values.shape[1:])
+    return weighed(flat, weight, starts).reshape(len(starts), *values.shape[1:])
 
 
 @compiled
