@@ -108,7 +108,7 @@ NO_DECISION = {
         signals.poses _AHEAD
         diagnose.checks.azimuth_resolution TURNS
         diagnose.checks.contradiction SHIFTS_S MOST_ACTUATORS
-        diagnose.checks.kinematics SIZE TINY STEPS
+        diagnose.checks.kinematics SIZE TINY_S STEPS
         diagnose.checks.pooling ROUNDS
         diagnose.inference.campaign_estimation ROUNDS SETTLED CONVERGED_GAIN RELAXATION KEPT_SLOPES
         diagnose.inference.campaign_course KNOTS_A_MEMORY MOST_KNOTS

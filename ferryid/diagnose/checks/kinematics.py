@@ -33,7 +33,8 @@ SCALE, ANGLE, X, Y, LATE, NORTH, EAST = range(7)
 """Places of k [-], b [rad], l [m], T [s] and the drift [m/s] among the parameters."""
 NEUTRAL = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 SIZE = np.array([0.5, 0.5, 10.0, 10.0, 2.0, 1.0, 1.0])
-TINY = np.array([1e-4, 1e-4, 1e-2, 1e-2, 1e-2, 1e-3, 1e-3])
+TINY_S = 1e-2
+"""Move of a delay by which a slope is found [s]."""
 TOGETHER = ((SCALE,), (ANGLE,), (X, Y), (LATE,))
 """Those that are let in together: of an arm with one component the other would be in the scatter."""
 GROSS = (SCALE, ANGLE)
@@ -100,28 +101,42 @@ class _Data:
     velocity: Floats
     pulled: Floats
 
-    def residual(self, p: Floats, velocity: Floats | None = None) -> Floats:
+    def residual(self, p: Floats) -> Floats:
         """Return what is left between position and velocity [m/s], shape (J, 2)."""
         heading = self.eta[:, 2] - p[ANGLE]
-        u, v = (self.velocity if velocity is None else velocity).T
         lever = np.column_stack(to_world(np.full_like(heading, p[X]), np.full_like(heading, p[Y]), heading))
-        over_ground = np.column_stack(to_world(u, v, heading)) / p[SCALE]
-        if p[LATE] != 0.0:
-            row = np.arange(len(heading), dtype=np.float64)
-            late = p[LATE] / self.problem.step_s
-            over_ground = np.column_stack([np.interp(row - late, row, one) for one in over_ground.T])
         moved = self.problem.rate(self.eta[:, :2] - lever)
-        return np.asarray(moved - self.problem.mean(over_ground) - p[NORTH:])
+        over_ground = self._over_ground(p, self.velocity)
+        return np.asarray(moved - self._mean_late(over_ground, p[LATE]) - p[NORTH:])
 
     def derivatives(self, p: Floats, velocity: Floats | None = None) -> Floats:
         """Return the residual's derivatives by the parameters, shape (J, 2, 7)."""
-        columns = []
-        for k, tiny in enumerate(TINY):
-            more, less = p.copy(), p.copy()
-            more[k] += tiny
-            less[k] -= tiny
-            columns.append((self.residual(more, velocity) - self.residual(less, velocity)) / (2.0 * tiny))
-        return np.stack(columns, axis=-1)
+        heading = self.eta[:, 2] - p[ANGLE]
+        over_ground = self._over_ground(p, self.velocity if velocity is None else velocity)
+        north, east = self._mean_late(over_ground, p[LATE]).T
+        # What moves with the heading, ahead and to starboard.
+        c, s = self.problem.rate(np.column_stack([np.cos(heading), np.sin(heading)])).T
+        out = np.zeros((len(c), 2, len(NEUTRAL)))
+        out[:, 0, SCALE], out[:, 1, SCALE] = north / p[SCALE], east / p[SCALE]
+        out[:, 0, ANGLE], out[:, 1, ANGLE] = -p[X] * s - p[Y] * c - east, p[X] * c - p[Y] * s + north
+        out[:, 0, X], out[:, 1, X] = -c, -s
+        out[:, 0, Y], out[:, 1, Y] = s, -c
+        sooner, later = (self._mean_late(over_ground, p[LATE] + move) for move in (-TINY_S, TINY_S))
+        out[:, :, LATE] = (sooner - later) / (2.0 * TINY_S)
+        out[:, 0, NORTH] = out[:, 1, EAST] = -1.0
+        return out
+
+    def _over_ground(self, p: Floats, velocity: Floats) -> Floats:
+        """Return a velocity along the vessel's axes as one over ground, shape (n, 2)."""
+        u, v = velocity.T
+        return np.asarray(np.column_stack(to_world(u, v, self.eta[:, 2] - p[ANGLE])) / p[SCALE])
+
+    def _mean_late(self, values: Floats, late_s: float) -> Floats:
+        """Return means in the windows of values that come late, shape (J, 2)."""
+        if late_s != 0.0:
+            row = np.arange(len(values), dtype=np.float64)
+            values = np.column_stack([np.interp(row - late_s / self.problem.step_s, row, one) for one in values.T])
+        return self.problem.mean(values)
 
     def instruments(self, p: Floats) -> Floats:
         """Return derivatives in which the velocity is that of the positions, shape (J, 2, 7)."""
