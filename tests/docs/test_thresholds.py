@@ -175,7 +175,7 @@ NO_DECISION = {
         effects.wind_loads BLOCK
         effects.wind KEPT
         models.forces.residual _RUNS
-        models.prediction.free_run MAX_STARTS
+        models.prediction.free_run MAX_STARTS MOST_RUNS
         compare.comparison_statements TOLD_QUANTITIES
         regression.cross_products CHUNK_ROWS SEGMENT_ROWS _BLAS_ENTRIES
         regression.cross_validation.folds MOST_GROUPS

@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from ferryid.models.forces.estimator import Estimator
+from ferryid.models.prediction import free_run
 from ferryid.models.prediction.free_run import run_free
 from ferryid.signals.track import Motion
 from ferryid.vessel import load_profile
@@ -88,6 +89,25 @@ def test_a_diverging_run_is_counted_not_averaged() -> None:
     run = run_free(Estimator(unstable, {}), [motion], [motion.valid])
     assert "diverged" in run.note
     assert not np.isinf(run.position_m).any()
+
+
+@pytest.mark.parametrize("most", [1000, 40], ids=["all at once", "some at a time"])
+def test_runs_of_several_logs_are_those_of_each_log_alone(monkeypatch: pytest.MonkeyPatch, most: int) -> None:
+    monkeypatch.setattr(free_run, "MOST_RUNS", most)
+    long, short = _trial(), _trial(70.0)
+    n = len(short.t)
+    aboard = replace(short, payload=np.where(short.t < 30.0, 90.0, 400.0)[:, None] * [[1.0, 0.0]] + [[0.0, 0.5]])
+    windy = replace(short, wind=np.column_stack([4.0 * np.sin(short.t / 9.0), np.full(n, 2.0)]))
+    heavier = replace(aboard, payload=aboard.payload[::-1].copy() if aboard.payload is not None else None)
+    every, law = [long, aboard, short, windy, heavier], Estimator(load_profile("milliampere"), {"delta": 1.2})
+    together = run_free(law, every, [one.valid for one in every]).single
+    assert together is not None
+    assert together.log.max() == 4
+    for k, motion in enumerate(every):
+        alone = run_free(law, [motion], [motion.valid]).single
+        assert alone is not None
+        assert np.nanmax(alone.errors) > 0.1
+        np.testing.assert_allclose(together.errors[together.log == k], alone.errors, rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize("rate_hz", [2.0, 10.0])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from ferryid.types import Flags, Floats, Ints
 HORIZONS_S = (5.0, 10.0, 20.0, 30.0, 60.0)
 MAX_STARTS = 60
 STEP_S = 0.2
+MOST_RUNS = 1000
+"""Runs that are integrated together: their paths are held in memory."""
 NO_MASS = "the model's effective mass matrix is not positive definite: it cannot be run free"
 
 
@@ -128,11 +130,13 @@ def run_free(
     diverged = 0
     if not runs_free(force, motions[0]):
         return _without(horizons, NO_MASS)
-    for number, (motion, allowed) in enumerate(zip(motions, rows, strict=True)):
-        starts, ends = starting_points(motion, allowed, float(horizons[0]), float(horizons[-1]))
-        if starts.size == 0:
-            continue
-        path, stride = _integrate(force, motion, starts, ends, float(horizons[-1]))
+    begun = [
+        (number, motion, *starting_points(motion, allowed, float(horizons[0]), float(horizons[-1])))
+        for number, (motion, allowed) in enumerate(zip(motions, rows, strict=True))
+    ]
+    begun = [one for one in begun if one[2].size]
+    paths = _side_by_side(force, [one[1:] for one in begun], float(horizons[-1]))
+    for (number, motion, starts, ends), (path, stride) in zip(begun, paths, strict=True):
         error = _errors(path, stride, motion, starts, ends, horizons)
         reached = _rows_at(starts, stride, motion.rate_hz, horizons) < ends[:, None]
         diverged += int(np.any(reached & np.isnan(error[:, :, 2]), axis=1).sum())
@@ -175,7 +179,7 @@ def single_runs(force: ForceLaw, motion: Motion, starts: Ints, ends: Ints, horiz
     not reach the horizon within its stretch. Parameters as of `run_free`, and starts and ends as of `starting_points`.
     """
     horizons = np.asarray(horizons_s, dtype=float)
-    path, stride = _integrate(force, motion, starts, ends, float(horizons[-1]))
+    (path,), stride = _integrate([(motion, starts, ends)], force, float(horizons[-1]))
     return _errors(path, stride, motion, starts, ends, horizons)
 
 
@@ -247,25 +251,52 @@ def _jumps(motion: Motion) -> Flags:
     return leaps
 
 
-def _integrate(force: ForceLaw, motion: Motion, starts: Ints, ends: Ints, horizon_s: float) -> tuple[Floats, int]:
-    """Return states (starts, steps + 1, 6) of position, heading, velocity, and the rows per step.
+_Runs = tuple[Motion, Ints, Ints]
+"""A log with the first rows of the runs in it, and the end of the unbroken stretch that each lies in."""
 
-    As far as the longest stretch goes, where that is shorter than the horizon.
+
+def _side_by_side(force: ForceLaw, runs: Sequence[_Runs], horizon_s: float) -> list[tuple[Floats, int]]:
+    """Return `_integrate` of every log; runs of logs that were measured alike take their steps together."""
+    alike: dict[tuple[object, ...], list[list[int]]] = {}
+    for number, (motion, starts, _) in enumerate(runs):
+        measured = tuple(getattr(motion, name) is None for name in ("wind", "current", "payload"))
+        batches = alike.setdefault((motion.rate_hz, motion.sway_measured, *measured), [[]])
+        if sum(len(runs[one][1]) for one in batches[-1]) + len(starts) > MOST_RUNS:
+            batches.append([])
+        batches[-1].append(number)
+    found: dict[int, tuple[Floats, int]] = {}
+    for batch in (one for batches in alike.values() for one in batches if one):
+        paths, stride = _integrate([runs[one] for one in batch], force, horizon_s)
+        found |= {one: (path, stride) for one, path in zip(batch, paths, strict=True)}
+    return [found[number] for number in range(len(runs))]
+
+
+def _integrate(runs: Sequence[_Runs], force: ForceLaw, horizon_s: float) -> tuple[list[Floats], int]:
+    """Return states (starts, steps + 1, 6) of position, heading, velocity for every log, and the rows per step.
+
+    As far as the longest stretch goes, where that is shorter than the horizon. The logs have one rate and the same signals.
     """
+    motions, (motion, *_) = [one for one, _, _ in runs], runs[0]
     stride = max(1, int(STEP_S * motion.rate_hz))
     substeps = max(1, int(np.ceil(1.0 / (STEP_S * motion.rate_hz))))
     dt = stride / motion.rate_hz / substeps
-    farthest = min(horizon_s * motion.rate_hz, float(np.max(ends - starts, initial=0)))
-    steps = int(np.ceil(farthest / stride))
-    last = len(motion.t) - 1
-    masses = _masses(force, motion)
+    longest = max(float(np.max(ends - starts, initial=0)) for _, starts, ends in runs)
+    steps = int(np.ceil(min(horizon_s * motion.rate_hz, longest) / stride))
+    counts = [len(starts) for _, starts, _ in runs]
+    # Rows of all logs one after the other.
+    first = np.concatenate([[0], np.cumsum([len(one.t) for one in motions])])
+    starts = np.concatenate([own + before for (_, own, _), before in zip(runs, first, strict=False)])
+    last = np.repeat(first[1:] - 1, counts)
+    outside = _Outside(*(_one_after_the_other(motions, name) for name in _Outside._fields))
+    masses = np.concatenate([_masses(force, one) for one in motions])
     inverses = np.linalg.inv(np.where(np.isfinite(masses), masses, np.eye(3)))
-    limit = 10.0 * np.nanmax(np.abs(motion.nu), axis=0) + 1e-3
+    limits = np.array([10.0 * np.nanmax(np.abs(one.nu), axis=0) + 1e-3 for one in motions])
     if not motion.sway_measured:
-        limit[1] = limit[0]
+        limits[:, 1] = limits[:, 0]
+    limit = np.repeat(limits, counts, axis=0)
+    eta, nu = (np.concatenate([getattr(one, name)[own] for one, own, _ in runs]) for name in ("eta", "nu"))
 
-    position = np.where(np.isfinite(motion.eta[starts]), motion.eta[starts], 0.0)
-    state = np.hstack([position, motion.nu[starts]])
+    state = np.hstack([np.where(np.isfinite(eta), eta, 0.0), nu])
     path = np.empty((len(starts), steps + 1, 6))
     path[:, 0] = state
 
@@ -289,7 +320,7 @@ def _integrate(force: ForceLaw, motion: Motion, starts: Ints, ends: Ints, horizo
             inverse = inverses[rows] if motion.payload is not None else inverses[0]
             for i in range(substeps):
                 a, b = i / substeps, (i + 1) / substeps
-                at_a, halfway, at_b = (_inputs(motion, rows, following, part) for part in (a, (a + b) / 2, b))
+                at_a, halfway, at_b = (_inputs(outside, rows, following, part) for part in (a, (a + b) / 2, b))
                 k1 = derivative(state, at_a, inverse)
                 k2 = derivative(state + dt / 2 * k1, halfway, inverse)
                 k3 = derivative(state + dt / 2 * k2, halfway, inverse)
@@ -297,20 +328,34 @@ def _integrate(force: ForceLaw, motion: Motion, starts: Ints, ends: Ints, horizo
                 state = state + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
             state[np.any(np.abs(state[:, 3:]) > limit, axis=1)] = np.nan
             path[:, k + 1] = state
-    return path, stride
+    return np.split(path, np.cumsum(counts)[:-1]), stride
+
+
+class _Outside(NamedTuple):
+    """What acts from outside in every row: actuator force, wind, current, payload; None where not measured."""
+
+    tau: Floats
+    wind: Floats | None
+    current: Floats | None
+    payload: Floats | None
+
+
+def _one_after_the_other(motions: Sequence[Motion], name: str) -> Any:
+    every = [getattr(one, name) for one in motions]
+    return None if every[0] is None else every[0] if len(every) == 1 else np.concatenate(every)
 
 
 _Inputs = tuple[Floats, Floats | None, Floats | None, tuple[Floats, ...]]
 """What acts from outside in the rows of a step: actuator force, wind, current, payload."""
 
 
-def _inputs(motion: Motion, rows: Ints, following: Ints, part: float) -> _Inputs:
+def _inputs(outside: _Outside, rows: Ints, following: Ints, part: float) -> _Inputs:
     return (
-        _between(motion.tau, rows, following, part),
-        None if motion.wind is None else _between(motion.wind, rows, following, part),
-        None if motion.current is None else _between(motion.current, rows, following, part),
+        _between(outside.tau, rows, following, part),
+        None if outside.wind is None else _between(outside.wind, rows, following, part),
+        None if outside.current is None else _between(outside.current, rows, following, part),
         # Held over the step, as it was measured: half a passenger never came aboard.
-        () if motion.payload is None else (motion.payload[rows],),
+        () if outside.payload is None else (outside.payload[rows],),
     )
 
 
