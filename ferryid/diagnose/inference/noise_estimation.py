@@ -82,7 +82,8 @@ def fit_noise(steps: Windows, gaps: Floats, initial: NoiseModel | None = None) -
         def searched(start: Floats, predictions: Predicting = predictions) -> tuple[float, Floats]:
             return _most_likely(predictions, start, _bounds(start, h))
 
-        _, best = min(over(searched, begin), key=lambda end: end[0])
+        # One after the other: threads of such short searches wait for the interpreter as long as they save.
+        _, best = min(map(searched, begin), key=lambda end: end[0])
         channels[own] = np.exp(best)
     return NoiseModel(channels)
 
