@@ -163,7 +163,9 @@ class _Grid:
         """Return the grid of places and slopes for runs of sizes with these logarithms, shape (n,)."""
         logit = log(RELIABLE / (1.0 - RELIABLE)) + slope[None, :, None] * (x[None, None] - place[:, None, None])
         prior_log = (SHAPE - 1.0) * np.log(slope) - slope / SCALE if prior else np.zeros_like(slope)
-        return cls(place, slope, -np.logaddexp(0.0, -logit), -np.logaddexp(0.0, logit), prior_log)
+        # log(1 + exp(-|logit|)) once for both, without overflow.
+        small = np.log1p(np.exp(-np.abs(logit)))
+        return cls(place, slope, np.minimum(logit, 0.0) - small, -np.maximum(logit, 0.0) - small, prior_log)
 
     def profile(self, named: Floats) -> tuple[Floats, NDArray[np.int64]]:
         """Return the greatest logarithm of the posterior at each place, shape (p, d), and where its slope is.
@@ -175,6 +177,25 @@ class _Grid:
         """
         every = self.yes @ named + self.no @ (1.0 - named) + self.prior[:, None]
         return every.max(axis=1), every.argmax(axis=1)
+
+    def profile_of_many(self, x: Floats, named: Floats) -> Floats:
+        """Return the greatest logarithm of the posterior at each place for many draws at once, shape (p, d).
+
+        The difference of both logarithms is the logit, which is linear in the size: how many of a draw are named, and the sum
+        of their sizes, are sufficient. A profile is less flat than rounding only where the slope has its prior.
+
+        Parameters
+        ----------
+        x
+            Logarithm of the sizes, shape (n,).
+        named
+            As of `profile`.
+        """
+        nobody = self.no.sum(axis=2) + self.prior
+        intercept = log(RELIABLE / (1.0 - RELIABLE)) - self.slope * self.place[:, None]
+        terms = np.stack([nobody, intercept, np.broadcast_to(self.slope, nobody.shape)], axis=2)
+        sums = np.stack([np.ones(named.shape[1]), named.sum(axis=0), x @ named])
+        return np.asarray((terms.reshape(-1, 3) @ sums).reshape(*nobody.shape, -1).max(axis=1))
 
 
 def curve(sizes: Sequence[float], named: Sequence[bool], *, prior: bool = True) -> Curve:
@@ -256,7 +277,7 @@ def ratio(sizes: Sequence[float], one: Sequence[bool], other: Sequence[bool], se
         (chance < norm.ppf(share)[:, None]).astype(np.float64)
         for chance, share in zip((first, second), shares, strict=True)
     ]
-    tops = [_top(grid, grid.profile(named)[0]) for named in drawn]
+    tops = [_top(grid, grid.profile_of_many(x, named)) for named in drawn]
     least, most = float(x.min()) - MARGIN, float(x.max()) + MARGIN
     lows = [np.where(top > most, most, np.where(top < least, -inf, top)) for top in tops]
     highs = [np.where(top > most, inf, np.where(top < least, least, top)) for top in tops]

@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ from ferryid.batch.spread import spread
 from ferryid.errors import FerryIdError
 from ferryid.files import unwritable
 from ferryid.validation import run as running
-from ferryid.validation import stages
+from ferryid.validation import stages, worker_client
 from ferryid.validation.checkpoint import completed, run_stage
 from ferryid.validation.commitment import verified_answers
 from ferryid.validation.interfaces import Evaluator
@@ -30,9 +31,9 @@ from ferryid.validation.records import Diagnosis
 from ferryid.validation.run import render_summary, run_validation
 from ferryid.validation.source_hash import source_hash
 from ferryid.validation.stages import LogJob, diagnose_case
-from ferryid.validation.worker import diagnose_log
+from ferryid.validation.worker_client import WorkerClient
 from tests.batch.work import children_of, ended, environment
-from tests.validation.stand_ins import PIPELINE, TALLY, OracleMade, chatty, counted
+from tests.validation.stand_ins import PIPELINE, QUICK, TALLY, OracleMade, chatty, counted
 
 pytestmark = pytest.mark.slow
 
@@ -45,18 +46,26 @@ def tally(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 class Here:
-    """Diagnoses as a worker does, in this process: for what a run does with diagnoses, wherever they are made."""
+    """Answers as a worker does, in this process: for what a run does with diagnoses, wherever and however they are made."""
 
     sources = source_hash()
 
     def diagnose(self, log: Path, profile: Path, out: Path, more: Sequence[Path] = ()) -> Diagnosis:
-        return diagnose_log(log, profile, out, more)
+        assert log.exists()
+        assert profile.exists()
+        return Diagnosis("not_testable", 0.0)
 
 
 @pytest.fixture
 def here(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Start no process to diagnose."""
+    """Start no process to diagnose, and diagnose nothing."""
     monkeypatch.setattr(stages, "worker_of", lambda folder: Here())
+
+
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Start processes that answer at once: for what becomes of them."""
+    monkeypatch.setattr(worker_client, "WorkerClient", partial(WorkerClient, program=QUICK))
 
 
 def validated(out: Path, pipeline: Any = PIPELINE, **options: Any) -> tuple[dict[str, Any], list[str]]:
@@ -77,14 +86,15 @@ def conforms(result: dict[str, Any]) -> None:
 
 
 def test_from_the_draw_to_the_scores(tmp_path: Path) -> None:
+    # The only one that diagnoses; one case of each format, and a second one of the first.
     out, stages = tmp_path / "out", []
-    result, announced = validated(out, runs=6, processes=2, progress=stages.append)
+    result, announced = validated(out, runs=4, processes=2, progress=stages.append)
     conforms(result)
-    names = [f"{number:04d}" for number in range(6)]
-    assert result["counts"] == {"cases": 6, "diagnosed": 6, "refused": 0, "crashed": 0}
-    assert result["scores"]["verdicts"] == ["not_testable"] * 6
-    assert announced[0].startswith("seed 7; if interrupted, go on with: ferryid prove --seed 7 --runs 6 --out ")
-    assert announced[-1] == f"commitment to 6 answers: {result['commitment']}"
+    names = [f"{number:04d}" for number in range(4)]
+    assert result["counts"] == {"cases": 4, "diagnosed": 4, "refused": 0, "crashed": 0}
+    assert result["scores"]["verdicts"] == ["not_testable"] * 4
+    assert announced[0].startswith("seed 7; if interrupted, go on with: ferryid prove --seed 7 --runs 4 --out ")
+    assert announced[-1] == f"commitment to 4 answers: {result['commitment']}"
     assert [one["case"]["name"] for one in result["scores"]["of"]] == names
     for one in result["scores"]["of"]:
         north = one["case"]["truths"][0]["values"]["north"]
@@ -107,24 +117,31 @@ def test_from_the_draw_to_the_scores(tmp_path: Path) -> None:
         there = {path.name for path in (out / "proof" / "logs" / one["case"]["name"]).iterdir()}
         assert len(there) == 2
         assert "vessel.toml" in there
-    assert any(stage.startswith("diagnosing: 6 of 6, 0 s left") for stage in stages)
+    assert any(stage.startswith("diagnosing: 4 of 4, 0 s left") for stage in stages)
     assert stages[-1] == ""
-    assert "6 cases of seed 7: 6 diagnosed, 0 refused, 0 crashed" in render_summary(result)
+    assert "4 cases of seed 7: 4 diagnosed, 0 refused, 0 crashed" in render_summary(result)
     # Nothing is left to do another time.
     before = counted()
-    again, announced = validated(out, runs=6)
+    again, announced = validated(out, runs=4)
     assert again == result
     assert "completed cases of this folder's run are kept" in announced
     assert counted() == before
 
 
+@pytest.mark.usefixtures("quick")
 def test_no_answer_is_on_disk_before_all_logs_are_diagnosed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     seen: dict[str, bytes] = {}
 
+    def note(when: str) -> None:
+        seen.update({f"{when}: {path}": path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()})
+
     def look(stage: str, *rest: Any, **options: Any) -> Any:
-        if stage in ("writing logs", "diagnosing"):
-            seen.update({f"{stage}: {path}": path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()})
-        return run_stage(stage, *rest, **options)
+        if stage not in ("writing logs", "diagnosing"):
+            return run_stage(stage, *rest, **options)
+        note(stage)
+        found = run_stage(stage, *rest, **options)
+        note(f"after {stage}")
+        return found
 
     monkeypatch.setattr(running, "run_stage", look)
     seed = 123_456_789_012
@@ -133,7 +150,7 @@ def test_no_answer_is_on_disk_before_all_logs_are_diagnosed(tmp_path: Path, monk
     truth = result["scores"]["of"][0]
     words = [str(seed), str(truth["case"]["seed"]), str(truth["realised"]["wind"]["force"]), "north"]
     ours = {name: data for name, data in seen.items() if "/logs/" not in name and not name.endswith("tally")}
-    assert len(ours) >= 4
+    assert len(ours) >= 12
     for name, data in ours.items():
         for word in words:
             assert word.encode() not in data, f"{name} has {word}"
@@ -142,8 +159,12 @@ def test_no_answer_is_on_disk_before_all_logs_are_diagnosed(tmp_path: Path, monk
     assert seal["commitment"] == result["commitment"]
 
 
-def test_on_a_cluster(tmp_path: Path, cluster: tuple[str, list[Any]]) -> None:
-    here = validated(tmp_path / "here", runs=3)[0]
+def test_on_a_cluster(
+    tmp_path: Path, cluster: tuple[str, list[Any]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(stages, "worker_of", lambda folder: Here())
+        here = validated(tmp_path / "here", runs=3)[0]
     there = validated(tmp_path / "there", runs=3, dask=cluster[0])[0]
     conforms(there)
     assert there["counts"] == here["counts"]
@@ -174,9 +195,14 @@ def test_a_fresh_seed_each_time(tmp_path: Path) -> None:
 
 SCRIPT = """
 import sys, time
+from functools import partial
 from pathlib import Path
+from ferryid.validation import worker_client
 from ferryid.validation.run import run_validation
-from tests.validation.stand_ins import PIPELINE
+from tests.validation.stand_ins import PIPELINE, QUICK
+
+# In the processes that the run starts as well: they import this file.
+worker_client.WorkerClient = partial(worker_client.WorkerClient, program=QUICK)
 
 def wait(stage):
     if stage.startswith(sys.argv[2]):
@@ -231,6 +257,7 @@ def test_killed_in_the_middle_it_repeats_nothing_and_loses_nothing(tmp_path: Pat
     assert not list((out / "proof" / "logs").glob(".*"))
 
 
+@pytest.mark.usefixtures("quick")
 def test_other_sources_or_another_seed_begin_from_the_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out = tmp_path / "out"
     first, _ = validated(out)
