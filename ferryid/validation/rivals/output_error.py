@@ -10,16 +10,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import log
+from functools import cached_property
+from math import cos, log, sin
 from pathlib import Path
 
 import numpy as np
 
+from ferryid.compiled import borrowing, compiled
 from ferryid.counts import counted
 from ferryid.diagnose import Estimate
 from ferryid.effects import Effect, effects
 from ferryid.effects.effect import HELD
-from ferryid.effects.force_model import COEFFICIENTS, ForceModel, Measurements, acceleration, hull_of
+from ferryid.effects.equations_of_motion import masses, other_forces, solved
+from ferryid.effects.force_model import COEFFICIENTS, ForceModel, Measurements, hull_of
+from ferryid.effects.hull_spread import default_hull_spread
 from ferryid.effects.measurements import hull_force_model
 from ferryid.errors import FerryIdError
 from ferryid.types import Floats, Ints
@@ -40,6 +44,10 @@ REFINED = 3
 PROBE = 1e-3
 """Finite difference, in sizes of a parameter."""
 MARGIN = 1e-9
+LARGEST = 1e6
+"""Bound of pose and velocities in an integration that diverges [m, rad, m/s, rad/s]."""
+SMALLEST = 1e-10
+"""Share of the largest singular value of columns below which one counts as zero."""
 FEWEST = 12
 """Segments below which there is nothing to choose by."""
 
@@ -83,47 +91,105 @@ class Segments:
     steps: int
     weights: Floats
 
+    @cached_property
+    def units(self) -> Floats:
+        """A unit of every coefficient of the hull, shape (26,)."""
+        seen = self.plain.measurements
+        return default_hull_spread(seen.profile, seen.nu[seen.usable])
+
     def left(self, force_model: ForceModel) -> Floats:
         """Return what a force model leaves of every node and channel, over the usual error of the channel, shape (m,)."""
         seen = force_model.measurements
-        state = np.hstack([seen.eta[self.starts], seen.nu[self.starts]])
-        dt, out = self.stride * seen.step_s, []
-        rate = _rates(force_model, self.starts, state)
-        for k in range(1, self.steps + 1):
-            rows = self.starts + k * self.stride
-            after = _rates(force_model, rows, state + dt * rate)
-            state = np.clip(state + 0.5 * dt * (rate + after), -1e6, 1e6)
-            rate = _rates(force_model, rows, state)
-            out.append((np.hstack([seen.eta[rows], seen.nu[rows]]) - state) * self.weights)
-        left = np.stack(out)
+        n, nothing = len(seen.t), np.empty((0, 0))
+        flow = nothing if force_model.flow is None else force_model.flow
+        load = nothing if force_model.load is None else force_model.load
+        factor = np.empty(0) if force_model.damping_factor is None else force_model.damping_factor
+        given = (seen.eta, seen.nu, force_model.parts, force_model.external, flow, load, factor)
+        # Compiled code does not look where an array ends.
+        if {len(one) for one in given if len(one)} != {n}:
+            raise ValueError(f"a force model of {counted(n, 'row')} has parts of other lengths")
+        eta, nu, *others = map(np.ascontiguousarray, given)
+        states = _integrated(
+            self.starts, self.stride, self.steps, self.stride * seen.step_s, eta, nu, force_model.hull, *others
+        )
+        rows = self.starts + self.stride * np.arange(1, self.steps + 1)[:, None]
+        left = (np.concatenate([eta[rows], nu[rows]], axis=2) - states) * self.weights
         return np.asarray(left[:, :, self.weights > 0.0].ravel())
 
 
-def _rates(force_model: ForceModel, rows: Ints, state: Floats) -> Floats:
-    """Return the derivatives of pose and velocities at some rows, shape (s, 6)."""
-    nu, psi = state[:, 3:], state[:, 2]
-    seen = force_model.measurements
-    now: Measurements = replace(
-        seen, t=seen.t[rows], eta=state[:, :3], nu=nu, nu_raw=nu, wind=None, current=None, payload=None, rudders=None
-    )
+@compiled
+def _integrated(
+    starts: Ints,
+    stride: int,
+    steps: int,
+    dt: float,
+    eta: Floats,
+    nu: Floats,
+    hull: Floats,
+    parts: Floats,
+    external: Floats,
+    flow: Floats,
+    load: Floats,
+    factor: Floats,
+) -> Floats:
+    """Integrate from every start with Heun's method; return pose and velocities at the nodes, shape (steps, s, 6).
 
-    def some(values: Floats | None) -> Floats | None:
-        return None if values is None else values[rows]
+    Forces are those of a force model in the rows; what it has not got is an array without rows. `flow` is north and east.
+    """
+    out = np.empty((steps, len(starts), 6))
+    state, rate, there, after = np.empty(6), np.empty(6), np.empty(6), np.empty(6)
+    for j in range(len(starts)):
+        row = starts[j]
+        state[:3], state[3:] = eta[row], nu[row]
+        _rates(row, state, hull, parts, external, flow, load, factor, rate)
+        for k in range(steps):
+            row += stride
+            for c in range(6):
+                there[c] = state[c] + dt * rate[c]
+            _rates(row, there, hull, parts, external, flow, load, factor, after)
+            for c in range(6):
+                value = state[c] + 0.5 * dt * (rate[c] + after[c])
+                # Not by min and max, of which a value that is not a number would come as a bound.
+                if value > LARGEST:
+                    value = LARGEST
+                elif value < -LARGEST:
+                    value = -LARGEST
+                state[c] = value
+                out[k, j, c] = value
+            _rates(row, state, hull, parts, external, flow, load, factor, rate)
+    return out
 
-    at = replace(
-        force_model,
-        measurements=now,
-        parts=force_model.parts[rows],
-        angles=force_model.angles[rows],
-        external=force_model.external[rows],
-        flow=some(force_model.flow),
-        load=some(force_model.load),
-        damping_factor=some(force_model.damping_factor),
-    )
-    c, s = np.cos(psi), np.sin(psi)
-    return np.hstack(
-        [np.column_stack([c * nu[:, 0] - s * nu[:, 1], s * nu[:, 0] + c * nu[:, 1], nu[:, 2]]), acceleration(at)]
-    )
+
+@borrowing
+def _rates(
+    i: int,
+    state: Floats,
+    hull: Floats,
+    parts: Floats,
+    external: Floats,
+    flow: Floats,
+    load: Floats,
+    factor: Floats,
+    out: Floats,
+) -> None:
+    """Fill in the derivatives of pose and velocities under the forces of a row, shape (6,).
+
+    See `ferryid.effects.equations_of_motion.accelerations`.
+    """
+    cosine, sine = cos(state[2]), sin(state[2])
+    u, v, r = state[3], state[4], state[5]
+    along, across = 0.0, 0.0
+    if flow.shape[0] > 0:
+        along = cosine * flow[i, 0] + sine * flow[i, 1]
+        across = cosine * flow[i, 1] - sine * flow[i, 0]
+    mass = masses(i, hull, load)
+    X, Y, N = other_forces(i, mass, u - along, v - across, r, hull, external, factor)
+    for k in range(parts.shape[1]):
+        X, Y, N = X + parts[i, k, 0], Y + parts[i, k, 1], N + parts[i, k, 2]
+    a, b, c = solved(mass, X, Y, N)
+    out[0], out[1], out[2] = cosine * u - sine * v, sine * u + cosine * v, r
+    # The body frame turns through the water.
+    out[3], out[4], out[5] = a + r * across, b - r * along, c
 
 
 def diagnose(log: str, profile: Profile, out: Path) -> tuple[Finding, ...]:
@@ -151,12 +217,13 @@ def diagnose(log: str, profile: Profile, out: Path) -> tuple[Finding, ...]:
     while len(chosen) < MOST_EFFECTS:
         taken = {one.key for one in chosen}
         promised = []
+        # What is known already explains the same of what is left, whatever is tried beside it.
+        known, largest = _span(slopes)
+        unexplained = left - known @ (known.T @ left)
         for one in (other for other in library if other.key not in taken):
             columns = _slopes(segments, [*chosen, one], np.append(z, np.zeros(len(one.sizes))), left, len(z))
-            rest = (
-                left
-                - np.hstack([slopes, columns]) @ np.linalg.lstsq(np.hstack([slopes, columns]), left, rcond=1e-10)[0]
-            )
+            more, scale = columns - known @ (known.T @ columns), max(largest, float(np.linalg.norm(columns)))
+            rest = unexplained - _projected(more, unexplained, scale)
             promised.append((_criterion(rest, len(z) + sum(each.onset_s > 0.0 for each in chosen) + one.cost), one))
         promised.sort(key=lambda pair: pair[0])
         best = None
@@ -245,20 +312,12 @@ def _library(seen: Measurements) -> list[Tried]:
 def _force_model(segments: Segments, tried: Sequence[Tried], z: Floats) -> ForceModel:
     h = len(COEFFICIENTS)
     known = segments.plain.hull
-    made = replace(segments.plain, hull=known + z[:h] * _units(segments))
+    made = replace(segments.plain, hull=known + z[:h] * segments.units)
     at = h
     for one in tried:
         made = one.act(made, z[at : at + len(one.sizes)])
         at += len(one.sizes)
     return made
-
-
-def _units(segments: Segments) -> Floats:
-    """Return a unit of every coefficient of the hull."""
-    from ferryid.effects.hull_spread import default_hull_spread
-
-    seen = segments.plain.measurements
-    return default_hull_spread(seen.profile, seen.nu[seen.usable])
 
 
 def _slopes(segments: Segments, tried: Sequence[Tried], z: Floats, left: Floats, first: int = 0) -> Floats:
@@ -268,6 +327,19 @@ def _slopes(segments: Segments, tried: Sequence[Tried], z: Floats, left: Floats,
         moved = z + PROBE * (np.arange(len(z)) == k)
         columns.append((left - segments.left(_force_model(segments, tried, moved))) / PROBE)
     return np.column_stack(columns) if columns else np.empty((len(left), 0))
+
+
+def _span(columns: Floats, scale: float = 0.0) -> tuple[Floats, float]:
+    """Return an orthonormal basis of what columns span, shape (m, r), and their largest singular value, at least `scale`."""
+    basis, sizes, _ = np.linalg.svd(columns, full_matrices=False)
+    largest = max(float(sizes[0]), scale)
+    return basis[:, sizes > SMALLEST * largest], largest
+
+
+def _projected(columns: Floats, left: Floats, scale: float) -> Floats:
+    """Return what columns explain of what is left by least squares; those much smaller than `scale` explain nothing."""
+    basis, _ = _span(columns, scale)
+    return np.asarray(basis @ (basis.T @ left))
 
 
 def _fitted(segments: Segments, tried: Sequence[Tried], z: Floats) -> tuple[Floats, Floats, Floats]:

@@ -67,24 +67,33 @@ def choose(X: Floats, y: Floats, block: Ints) -> Floats:
     errors = np.empty((len(settings), len(folds)))
     for j, fold in enumerate(folds.tolist()):
         held = block == fold
+        rows = _condensed(X[~held], y[~held])
         for i, (ridge, threshold) in enumerate(settings):
-            found = _thresholded(X[~held], y[~held], threshold, ridge)
+            found = _thresholded(*rows, threshold, ridge)
             errors[i, j] = np.mean((y[held] - X[held] @ found) ** 2)
     mean = errors.mean(axis=1)
     best = int(np.argmin(mean))
     # Blocks are alike in what the settings make of them: their difference to the best counts, not their own scatter.
     spread = (errors - errors[best]).std(axis=1, ddof=1) / np.sqrt(len(folds))
     fine = np.flatnonzero(mean <= mean[best] + spread).tolist()
-    fits = {i: _thresholded(X, y, settings[i][1], settings[i][0]) for i in fine}
+    rows = _condensed(X, y)
+    fits = {i: _thresholded(*rows, settings[i][1], settings[i][0]) for i in fine}
     return fits[min(fine, key=lambda i: (np.count_nonzero(fits[i]), mean[i]))]
 
 
-def _thresholded(X: Floats, y: Floats, threshold: float, ridge: float) -> Floats:
+def _condensed(X: Floats, y: Floats) -> tuple[Floats, Floats, int]:
+    """Return as few rows as there are columns with the same least squares, and how many rows there were."""
+    triangle = np.linalg.qr(np.column_stack([X, y]), mode="r")
+    return triangle[:, :-1], triangle[:, -1], len(y)
+
+
+def _thresholded(X: Floats, y: Floats, count: int, threshold: float, ridge: float) -> Floats:
+    """Return the coefficients that STLSQ finds for rows that `_condensed` made of `count`."""
     from pysindy.optimizers import STLSQ
 
     with warnings.catch_warnings():
         # That a large threshold leaves no term at all is a result, and what cross-validation is there to decide.
         warnings.filterwarnings("ignore", message="Sparsity parameter is too big")
         warnings.filterwarnings("ignore", message="STLSQ did not converge")
-        found = STLSQ(threshold=threshold, alpha=ridge * len(y)).fit(X, y)
+        found = STLSQ(threshold=threshold, alpha=ridge * count).fit(X, y)
     return np.asarray(found.coef_, dtype=np.float64).reshape(-1)
