@@ -28,14 +28,16 @@ TALLY = "FERRYID_TEST_TALLY"
 QUICK = (
     "-c",
     f"""
-import json, sys, time
+import json, os, sys, time
 print(json.dumps({{"sources": {source_hash()!r}}}), flush=True)
 for line in sys.stdin:
     time.sleep(0.05)
-    print(json.dumps({{"verdict": "not_testable", "seconds": 0.05}}), flush=True)
+    verdict = "not_testable" if os.path.isdir(os.environ["TMPDIR"]) else "crashed"
+    print(json.dumps({{"verdict": verdict, "seconds": 0.05}}), flush=True)
 """,
 )
-"""What a worker is to run that answers as one whose logs hold nothing, and loads nothing to do so."""
+"""What a worker is to run that answers as one whose logs hold nothing, and loads nothing to do so; as such a one it needs the
+folder for temporary files that it was given."""
 
 
 @dataclass(frozen=True)

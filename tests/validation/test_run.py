@@ -159,9 +159,7 @@ def test_no_answer_is_on_disk_before_all_logs_are_diagnosed(tmp_path: Path, monk
     assert seal["commitment"] == result["commitment"]
 
 
-def test_on_a_cluster(
-    tmp_path: Path, cluster: tuple[str, list[Any]], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_on_a_cluster(tmp_path: Path, cluster: tuple[str, list[Any]], monkeypatch: pytest.MonkeyPatch) -> None:
     with monkeypatch.context() as patch:
         patch.setattr(stages, "worker_of", lambda folder: Here())
         here = validated(tmp_path / "here", runs=3)[0]
