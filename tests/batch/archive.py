@@ -55,6 +55,16 @@ def same(result: BatchResult) -> str:
     return json.dumps(rows, indent=1)
 
 
+def blank(one: task.Task) -> LogResult:
+    """Work, and leave figures blank, as tests do that look at none."""
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    from tests.conftest import BLANK
+
+    FigureCanvasSVG.print_svg = lambda canvas, file, **options: file.write(BLANK)  # type: ignore[method-assign]
+    return task.work(one)
+
+
 def deadly(one: task.Task) -> LogResult:
     """Work, but die at once at a log of that name."""
     if "deadly" in one.name:

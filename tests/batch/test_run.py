@@ -27,7 +27,7 @@ from ferryid.errors import FerryIdError, UnwritableError
 from ferryid.files import dump_json, unwritable
 from ferryid.report.batch_rows import BatchResult
 from ferryid.vessel import load_profile
-from tests.batch.archive import archive, deadly, recipe, rows_of, run, same
+from tests.batch.archive import archive, blank, deadly, recipe, rows_of, run, same
 from tests.batch.work import children_of, default_interrupts, ended, environment
 from tests.cli.test_every_command import conforms
 
@@ -91,9 +91,16 @@ def test_a_bad_log_is_a_row_and_the_rest_goes_on(tmp_path: Path) -> None:
     assert len(set(before.items()) - set(rows_of(tmp_path).items())) == 2
 
 
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave figures blank in the processes of a batch as well."""
+    monkeypatch.setattr(running, "work", blank)
+
+
+@pytest.mark.usefixtures("undrawn")
 def test_every_step_of_one_log(tmp_path: Path) -> None:
     logs = archive(tmp_path, 1)
-    recipe(tmp_path, '[fit]\ndelta = 0.4\nsigma = 0.4\naccept = "thesis"\n')
+    recipe(tmp_path, '[fit]\ndelta = 0.4\nsigma = 0.4\naccept = "thesis"\ndraws = 20\n')
     result, _ = run(tmp_path, logs / "*.mcap")
     (row,) = result.rows
     assert row.status == "done", row.reason
@@ -538,6 +545,7 @@ def test_a_row_that_does_not_tell_what_was_lost_stands(one: task.Task) -> None:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems take no such name")
+@pytest.mark.usefixtures("undrawn")
 def test_a_name_of_bytes_that_are_no_characters(tmp_path: Path) -> None:
     logs = archive(tmp_path, 1)
     recipe(tmp_path, 'steps = ["fit", "evaluate", "diagnose"]\n[fit]\ndraws = 20\nestimator = "derivative"\n')
