@@ -16,7 +16,7 @@ import ferryid.cli
 from ferryid.regression.bases.forms import basis_names
 from tests.report.pages import needs_nothing
 
-pytestmark = [pytest.mark.slow, pytest.mark.draws]
+pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = sorted(
@@ -86,6 +86,7 @@ def test_inspect(ferryid, fixtures: Path, log: str, vessel: tuple[str, ...]) -> 
     assert conforms(run.out)["messages"] > 0
 
 
+@pytest.mark.draws
 def test_ingest_fit_evaluate_compare_and_models(ferryid, fixtures: Path, tmp_path: Path) -> None:
     log, other, out = fixtures / "short.mcap", fixtures / "short.bag", tmp_path / "out"
 
@@ -155,6 +156,7 @@ def test_ingest_fit_evaluate_compare_and_models(ferryid, fixtures: Path, tmp_pat
     conforms(ferryid("models", "milliampere@1", "--out", out, "--json", "-").out)
 
 
+@pytest.mark.draws
 @pytest.mark.parametrize(("what", "windows"), [("components", 1), ("window", 8), ("both", 2)])
 def test_sweep_settings(ferryid, fixtures: Path, tmp_path: Path, what: str, windows: int) -> None:
     logs = [fixtures / "short.mcap", fixtures / "short.bag"]
@@ -176,6 +178,7 @@ def test_sweep_settings(ferryid, fixtures: Path, tmp_path: Path, what: str, wind
     assert needs_nothing(text)
 
 
+@pytest.mark.draws
 def test_sweep_structures(ferryid, fixtures: Path, tmp_path: Path) -> None:
     logs = [fixtures / "short.mcap", fixtures / "short.bag"]
     run = ferryid("sweep", "basis", *logs, "--vessel", "milliampere", *SCALE, "--out", tmp_path, "--json", "-")
@@ -207,6 +210,7 @@ def test_fit_takes_the_window_that_it_is_told_to_choose(ferryid, fixtures: Path,
     assert f"fitted with basis {told}\n" in run.out
 
 
+@pytest.mark.draws
 def test_diagnose_one_log_and_two(ferryid, fixtures: Path, tmp_path: Path) -> None:
     log, other = fixtures / "short.mcap", fixtures / "short.bag"
     run = ferryid("diagnose", log, "--vessel", "milliampere", "--out", tmp_path, "--json", "-")

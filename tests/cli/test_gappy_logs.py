@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 
-from tests.command_line.in_process import Run
+from tests.command_line.in_process import Run, invoke
 from tests.damage import NAVIGATION, THRUSTER, silent, ten_minutes, without_heading, written
 
-pytestmark = [pytest.mark.slow, pytest.mark.draws]
+pytestmark = pytest.mark.slow
 
 SECONDS = (0.3, 1.0, 5.0, 60.0)
 VESSEL = ("--vessel", "milliampere")
@@ -64,13 +64,20 @@ def test_inspect_and_ingest_count_the_gaps(ferryid: Command, place: Path) -> Non
     assert "4 gaps in the recording, the longest 60" in " ".join(tables[0]["data_quality"]["remarks"])
 
 
-def test_fit_evaluate_compare_and_export_leave_the_rows_out_and_count_them(ferryid: Command, place: Path) -> None:
-    log, out = place / "gaps.mcap", ("--out", place / "out")
-    run = ferryid("fit", log, *VESSEL, *out, "--json", place / "fit.json", "--components", "3")
+@pytest.fixture(scope="module")
+def fitted(place: Path) -> Run:
+    """What the fit of the model milliampere@1 printed; its JSON is in fit.json."""
+    out = ("--out", place / "out", "--json", place / "fit.json")
+    return invoke("fit", place / "gaps.mcap", *VESSEL, *out, "--components", "3")
+
+
+@pytest.mark.draws
+def test_a_fit_leaves_the_rows_out_counts_them_and_shows_them(fitted: Run, place: Path) -> None:
+    run = fitted
     assert run.code == 0, run.err
     assert counted(run.out)
-    fitted = json.loads((place / "fit.json").read_text(encoding="utf-8"))
-    measured, beside = fitted["logs"][0]["left_out"]
+    told = json.loads((place / "fit.json").read_text(encoding="utf-8"))
+    measured, beside = told["logs"][0]["left_out"]
     assert measured["seconds"] == pytest.approx(LOST, abs=2.0)
     assert measured["stretches"] == 9
     assert beside["rows"] == 9 * 22
@@ -79,15 +86,21 @@ def test_fit_evaluate_compare_and_export_leave_the_rows_out_and_count_them(ferry
         one["start_s"] == pytest.approx(300.0, abs=0.5) and "n_thruster1" in one["signals"]
         for one in measured["intervals"]
     )
-    shown(Path(fitted["report"]).read_text(encoding="utf-8"))
-    assert ">validation</text>" in Path(fitted["report"]).read_text(encoding="utf-8")
+    page = Path(told["report"]).read_text(encoding="utf-8")
+    shown(page)
+    assert ">validation</text>" in page
+
+
+@pytest.mark.usefixtures("fitted")
+def test_evaluate_compare_and_export_leave_the_rows_out_and_count_them(ferryid: Command, place: Path) -> None:
+    log, out = place / "gaps.mcap", ("--out", place / "out")
     used = result(ferryid("models", "milliampere@1", *out, "--json", "-"))["training"][0]["rows"]
     assert used < 20 * (600 - LOST)
 
     entry = result(ferryid("evaluate", "milliampere@1", log, *out, "--json", "-"))["logs"][0]
     assert entry["rows"] <= 20 * (600 - LOST)
     assert counted(" ".join(entry["warnings"]))
-    assert ferryid("fit", log, *VESSEL, *out, "--components", "1").code == 0
+    assert ferryid("fit", log, *VESSEL, *out, "--components", "1", "--no-report").code == 0
     run = ferryid("compare", "milliampere@1", "milliampere@2", "--on", log, place / "whole.mcap", *out)
     assert run.code == 0, run.err
     assert counted(run.out)
@@ -122,6 +135,7 @@ def test_fit_and_sweep_of_an_archive(ferryid: Command, place: Path) -> None:
         assert whole["warnings"] == []
 
 
+@pytest.mark.draws
 def test_diagnoses(ferryid: Command, place: Path) -> None:
     log, out = place / "gaps.mcap", ("--out", place / "out", "--json", "-")
     found = result(ferryid("diagnose", log, place / "whole.mcap", *VESSEL, *out))
