@@ -83,7 +83,7 @@ def choose(X: Floats, y: Floats, block: Ints) -> Floats:
 
 def _condensed(X: Floats, y: Floats) -> tuple[Floats, Floats, int]:
     """Return as few rows as there are columns with the same least squares, and how many rows there were."""
-    triangle = np.linalg.qr(np.column_stack([X, y]), mode="r")
+    _, triangle = np.linalg.qr(np.column_stack([X, y]))
     return triangle[:, :-1], triangle[:, -1], len(y)
 
 
