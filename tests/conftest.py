@@ -10,6 +10,9 @@ from typing import Any
 
 import pytest
 
+# Before NumPy is loaded: the commands use one thread, and a second one only waits on problems of this size, at full power.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
 
