@@ -30,8 +30,9 @@ from ferryid.models.forces import (
 )
 from ferryid.models.prediction import predict, predict_with_effects, predicted_acceleration
 from ferryid.regression.bases import Basis, make_basis
-from ferryid.signals.prepare import Opened, smoothed
+from ferryid.signals.prepare import Opened, Prepared, smoothed
 from ferryid.signals.smooth import Measured
+from ferryid.signals.track import Motion
 from ferryid.types import Flags, Floats, RunContext
 from ferryid.vessel.dimensions import window_seconds
 from ferryid.vessel.profile import Profile
@@ -197,24 +198,41 @@ def _with_terms(model: Model, functions: Basis) -> Model:
 
 
 def _unexplained(model: Model, opened: Opened, profile: Profile, bare: Profile, settings: FitSettings) -> Measured:
-    """Return what was measured, with the forces of the model beyond its hull's taken off the applied force."""
-    prepared = smoothed(opened, settings.window_s, settings.smoother, keep_track=True)
-    found = predict_with_effects(model, prepared, profile, window_s=settings.window_s, smoother=settings.smoother)
-    before, seen, measured = prepared.motion, found.motion, opened.measured
-    needed = found.force(seen.nu_dot, seen.nu, seen.eta[:, 2], seen.wind, seen.current, seen.payload)
-    hull = base_force(bare, replace(seen, current=before.current, payload=before.payload), settings.scale)
-    known = before.valid & np.isfinite(needed - hull).all(axis=1)
+    """Return what was measured, with the forces of the model beyond its hull's taken off the applied force.
 
-    def bridged(values: Floats) -> Floats:
+    They go with the velocity: beside a velocity with slow errors a wind would load the vessel otherwise than beside a better
+    one, and a fit to what is left would put the difference into the damping.
+    """
+    prepared = smoothed(opened, settings.window_s, settings.smoother, keep_track=True)
+    before, measured = prepared.motion, opened.measured
+    seen, more, known = _beyond_hull(model, prepared, profile, bare, settings, steadied=False)
+    _, steadied, also = _beyond_hull(model, prepared, profile, bare, settings, steadied=True)
+
+    def bridged(values: Floats, rows: Flags) -> Floats:
         # Smoothing once more would lose as many rows again beside every gap.
-        return interpolate_gaps(np.where(known[:, None], values, np.nan), known)
+        return interpolate_gaps(np.where(rows[:, None], values, np.nan), rows)
 
     return replace(
         measured,
-        tau=measured.tau + bridged(seen.tau - before.tau - needed + hull),
-        nu=measured.nu + bridged(seen.nu - before.nu),
-        eta=measured.eta if seen.eta is before.eta else measured.eta + bridged(seen.eta - before.eta),
+        tau=measured.tau + bridged(more, known),
+        tau_steadied=measured.tau + bridged(steadied, also),
+        nu=measured.nu + bridged(seen.nu - before.nu, known),
+        eta=measured.eta if seen.eta is before.eta else measured.eta + bridged(seen.eta - before.eta, known),
     )
+
+
+def _beyond_hull(
+    model: Model, prepared: Prepared, profile: Profile, bare: Profile, settings: FitSettings, *, steadied: bool
+) -> tuple[Motion, Floats, Flags]:
+    """Return a log as a model sees it, which force acts that its hull does not know, (n, 3), and where that is known, (n,)."""
+    found = predict_with_effects(
+        model, prepared, profile, window_s=settings.window_s, smoother=settings.smoother, steadied=steadied
+    )
+    before, seen = prepared.motion, found.motion
+    needed = found.force(seen.nu_dot, seen.nu, seen.eta[:, 2], seen.wind, seen.current, seen.payload)
+    hull = base_force(bare, replace(seen, current=before.current, payload=before.payload), settings.scale)
+    known = before.valid & np.isfinite(needed - hull).all(axis=1)
+    return seen, seen.tau - before.tau - needed + hull, known
 
 
 def _kept(model: Model) -> dict[str, object]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from ferryid.identify.weak_rows import row_columns
@@ -42,8 +43,11 @@ class SharedRows:
         key = *(id(one) for one in made_of), steadied, *sorted(scale.items())
         if key in self._columns:
             return self._columns[key][1]
-        found = row_columns(motion, profile, scale, functions, self.velocity(motion, steadied=steadied))
-        rows = {**self._rows, id(motion): len(motion.t)}
+        velocity = self.velocity(motion, steadied=steadied)
+        if steadied and motion.tau_steadied is not None:
+            motion = replace(motion, tau=motion.tau_steadied)
+        found = row_columns(motion, profile, scale, functions, velocity)
+        rows = {**self._rows, id(made_of[0]): len(motion.t)}
         if sum(rows.values()) <= MOST_ROWS:
             self._rows = rows
             self._columns[key] = made_of, found

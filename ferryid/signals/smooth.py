@@ -43,6 +43,7 @@ class Measured:
     repairs: tuple[str, ...]
     left_out: tuple[LeftOut, ...] = ()
     sway_measured: bool = True
+    tau_steadied: Floats | None = None
 
 
 def measure(track: Track, profile: Profile, *, steady_force: bool = False) -> Measured:
@@ -193,6 +194,7 @@ def smooth_measured(measured: Measured, window_s: float, smoother: str = "square
         ),
         left_out=(*measured.left_out, *beside),
         sway_measured=measured.sway_measured,
+        tau_steadied=done.get("tau_steadied"),
     )
 
 
@@ -277,6 +279,7 @@ def correlate(values: Floats, weights: Floats) -> Floats:
 _AXIS_OF = {
     "nu": (0, 1, 2),
     "tau": (0, 1, 2),
+    "tau_steadied": (0, 1, 2),
     "eta": (0, 1, 2),
     "tau_d": (0, 1, 2),
     "eta_d": (0, 1, 2),

@@ -181,6 +181,9 @@ class Motion:
         Rows that are not valid because of gaps, faults and what smoothing loses beside them, by reason; each row once.
     sway_measured
         False where sway velocity was not measured and stands as zero: forces and motion in sway say nothing.
+    tau_steadied
+        What `tau` is beside velocities whose slow errors are replaced by the position's, shape (n, 3), or None where it is the
+        same: forces that a model knows, and that are taken off, go with the velocity.
     """
 
     log: str
@@ -200,3 +203,4 @@ class Motion:
     repairs: tuple[str, ...] = field(default=())
     left_out: tuple[LeftOut, ...] = ()
     sway_measured: bool = True
+    tau_steadied: Floats | None = None

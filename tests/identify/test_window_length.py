@@ -121,3 +121,11 @@ def test_rows_of_another_scale_or_basis_are_made_anew() -> None:
     assert again is one
     assert not np.array_equal(heavier["steady"], one["steady"])
     assert other["functions"].shape != one["functions"].shape
+
+
+def test_forces_that_are_taken_off_go_with_the_velocity_that_enters_products() -> None:
+    (motion,) = data_of([measured(1, seconds=120.0)]).motions
+    left = replace(motion, tau_steadied=motion.tau + 3.0)
+    for one, steadied, more in ((left, False, 0.0), (left, True, 3.0), (motion, True, 0.0)):
+        force = shared_rows.SharedRows().columns(one, PROFILE, SCALE, BASIS, steadied=steadied)["force"]
+        np.testing.assert_array_equal(force, np.nan_to_num(motion.tau + more))

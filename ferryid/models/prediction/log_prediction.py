@@ -9,13 +9,14 @@ import numpy as np
 
 from ferryid.counts import counted
 from ferryid.effects import effects
-from ferryid.effects.measurements import measurements_of_motion, payload_and_damping
+from ferryid.effects.measurements import interpolate_gaps, measurements_of_motion, payload_and_damping
 from ferryid.errors import FerryIdError
 from ferryid.models.forces.estimator import ForceLaw, base_estimator, model_estimator
 from ferryid.models.forces.model_forces import ModelForces, force_law
 from ferryid.models.model import Model
 from ferryid.models.prediction.free_run import FreeRun, run_free
 from ferryid.models.stored_effect import Conditions, StoredEffect
+from ferryid.signals.complementary_filter import complementary_filter
 from ferryid.signals.prepare import Prepared
 from ferryid.signals.smooth import central_difference, measure, smooth_measured
 from ferryid.signals.track import Motion
@@ -112,10 +113,11 @@ def signal_map(model: Model, profile: Profile | None) -> Profile:
 
 
 def predict_with_effects(
-    model: Model, prepared: Prepared, profile: Profile, *, window_s: float, smoother: str
+    model: Model, prepared: Prepared, profile: Profile, *, window_s: float, smoother: str, steadied: bool = False
 ) -> Prediction:
     """Return what a model expects of a log by way of a force model; see `predict`.
 
+    With `steadied`, slow errors of the velocities are replaced by the position's; see `ferryid.signals.complementary_filter`.
     Of a model without a diagnosis this is what the diagnosis started from: the force of its estimator, and the drag of still
     air where no wind was measured and the model has no terms of its own.
     """
@@ -131,6 +133,9 @@ def predict_with_effects(
     if right is not measurements:
         slope = central_difference(right.nu, motion.rate_hz)
         motion = replace(motion, eta=right.eta, nu=right.nu, nu_dot=np.where(np.isfinite(motion.nu_dot), slope, np.nan))
+    if steadied:
+        motion = replace(motion, nu=complementary_filter(motion.nu, motion.nu, motion.eta, motion.rate_hz))
+        right = replace(right, nu=interpolate_gaps(motion.nu, motion.valid))
     plain = known.plain(right)
     found = known.altered(plain, sha256, righted=True)
     force_model, tau = found.force_model, motion.tau
