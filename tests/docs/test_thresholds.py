@@ -127,7 +127,7 @@ NO_DECISION = {
         diagnose.inference.onset_estimation FIRST_TIME_STEP_S LAST_TIME_STEP_S COMPARING_ITERATIONS
         diagnose.inference.profile_likelihood FIRST_STEP STEP_GROWTH LARGEST_FALL MOST_REFINEMENTS QUANTILES
         diagnose.inference.search COARSE_ITERATIONS
-        diagnose.inference.stochastic_disturbance START_STRENGTHS START_FREQUENCIES GIVEN_WAY
+        diagnose.inference.stochastic_disturbance START_STRENGTHS START_FREQUENCIES GIVEN_WAY GROWTH_ROUNDS
         diagnose.inference.disturbance_course GROWTHS FINEST_FACTOR GROWTH_DIFFERENCE
         diagnose.judging.findings TIME_STEP TIME_FIT TIME_FINE_S TIMES_AT_ONCE TIME_STRAIGHT
         diagnose.judging.campaign_split WEIGHED
