@@ -18,7 +18,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from ferryid.errors import UnwritableError
-from ferryid.files import replacing
+from ferryid.files import remove_abandoned, replacing
 from ferryid.report.timeline import Timeline, scripts
 
 SCRIPTS = ("uplot.js", "theme.js", "decode.js", "map.js", "strips.js", "timeline.js")
@@ -108,6 +108,7 @@ def write_assets(out: Path) -> None:
     key, contents = _contents()
     folder = out / "reports" / "assets" / key
     if folder.is_dir():
+        remove_abandoned(folder.parent)
         return
     try:
         with replacing(folder) as temporary:

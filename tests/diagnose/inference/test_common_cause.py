@@ -27,16 +27,16 @@ def test_each_further_coefficient_needs_the_odds_of_an_effect(monkeypatch: pytes
     names = [f"c{k}" for k in range(5)]
     G = np.diag(np.full(5, 1e4))
     b = np.array([1e4 * 1.11, 1e4 * 0.45, 0.0, 0.0, 0.0])
-    assert hull_parameters._best_subset(G, b, names)[0] == {"c0"}
+    assert hull_parameters._best_subset(G, b, names, EFFECTS.hull_spread)[0] == {"c0"}
     free = replace(EFFECTS, coefficient_odds=0.0)
     monkeypatch.setattr(hull_parameters, "EFFECTS", free)
-    assert hull_parameters._best_subset(G, b, names)[0] == {"c0", "c1"}
+    assert hull_parameters._best_subset(G, b, names, EFFECTS.hull_spread)[0] == {"c0", "c1"}
 
 
 def test_a_model_that_is_wrong_all_over_costs_no_more_than_a_few() -> None:
     names = [f"c{k}" for k in range(8)]
     G, b = np.diag(np.full(8, 1e4)), np.full(8, 1e4)
-    chosen, cost = hull_parameters._best_subset(G, b, names)
+    chosen, cost = hull_parameters._best_subset(G, b, names, EFFECTS.hull_spread)
     assert chosen == set(names)
     assert cost == pytest.approx(np.log(8.0) + EFFECTS.coefficients_apart * EFFECTS.coefficient_odds)
 
