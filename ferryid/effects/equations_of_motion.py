@@ -110,6 +110,26 @@ def solved(mass: tuple[float, float, float, float, float], X: float, Y: float, N
     return X / m11, (m33 * Y - m23 * N) / det, (m22 * N - m32 * Y) / det
 
 
+@borrowing
+def acceleration_in(
+    i: int,
+    u: float,
+    v: float,
+    r: float,
+    hull: Floats,
+    parts: Floats,
+    external: Floats,
+    load: Floats,
+    factor: Floats,
+) -> tuple[float, float, float]:
+    """Return the acceleration through the water that the forces of a row give at a velocity through it."""
+    mass = masses(i, hull, load)
+    X, Y, N = other_forces(i, mass, u, v, r, hull, external, factor)
+    for k in range(parts.shape[1]):
+        X, Y, N = X + parts[i, k, 0], Y + parts[i, k, 1], N + parts[i, k, 2]
+    return solved(mass, X, Y, N)
+
+
 @compiled
 def accelerations(
     nu: Floats, hull: Floats, parts: Floats, external: Floats, flow: Floats, load: Floats, factor: Floats
@@ -130,11 +150,7 @@ def accelerations(
     out = np.empty_like(nu)
     for i in range(nu.shape[0]):
         u, v, r = relative(i, nu, flow)
-        mass = masses(i, hull, load)
-        X, Y, N = other_forces(i, mass, u, v, r, hull, external, factor)
-        for k in range(parts.shape[1]):
-            X, Y, N = X + parts[i, k, 0], Y + parts[i, k, 1], N + parts[i, k, 2]
-        a, b, c = solved(mass, X, Y, N)
+        a, b, c = acceleration_in(i, u, v, r, hull, parts, external, load, factor)
         if flow.shape[0] > 0:
             # The body frame turns through the water.
             a, b = a + r * flow[i, 1], b - r * flow[i, 0]

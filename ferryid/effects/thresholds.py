@@ -14,7 +14,7 @@ class EffectThresholds:
     hull_spread: float = threshold(
         0.12,
         "of the coefficient",
-        "standard deviation of the prior of the hull's coefficients",
+        "standard deviation of the prior of the hull's coefficients where the profile states none",
         "convention: how well a hull model is known",
     )
     selected_spread: float = threshold(

@@ -204,7 +204,7 @@ class IdentifyThresholds:
     hull_spread: float = threshold(
         0.4,
         "of the coefficient",
-        "standard deviation of the prior of a fit's damping where the profile has a hull model",
+        "standard deviation of the prior of a fit's damping where the profile has a hull model and states no spread of it",
         "convention: a model that is worth correcting may be so far off",
     )
     unmodelled_share: float = threshold(
@@ -216,7 +216,7 @@ class IdentifyThresholds:
     mass_spread: float = threshold(
         0.2,
         "of the inertia",
-        "standard deviation of the prior where the profile has a hull model",
+        "standard deviation of the prior where the profile has a hull model and states no spread of it",
         "convention: as `hull_spread`",
     )
     unknown_mass_spread: float = threshold(

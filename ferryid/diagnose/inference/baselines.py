@@ -35,7 +35,7 @@ class HullBaseline:
 
     @property
     def hull_known(self) -> bool:
-        """True where the profile has a hull model, or there is a fitted one."""
+        """True where the profile has a hull model that estimates may lean on, or there is a fitted one."""
         return self.model is not None or self.profile.hull.is_known
 
     @property
@@ -60,7 +60,7 @@ class SimulationBaseline:
 
     @property
     def hull_known(self) -> bool:
-        """True where the profile has a hull model."""
+        """True where the profile has a hull model that estimates may lean on."""
         return self.simulated.measurements.profile.hull.is_known
 
     @property
@@ -94,7 +94,7 @@ class CampaignBaseline:
 
     @property
     def hull_known(self) -> bool:
-        """True where the profile has a hull model, or there is a fitted one."""
+        """True where the profile has a hull model that estimates may lean on, or there is a fitted one."""
         return self.model is not None or self.profile.hull.is_known
 
     @property

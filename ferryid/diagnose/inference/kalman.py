@@ -252,37 +252,6 @@ def run_covariances(
                 break
 
 
-def errors(
-    K: Floats,
-    spread: Floats,
-    noise: Floats,
-    integrals: int,
-    blocks: Floats,
-    columns: Floats,
-    step_s: float,
-    series: Floats,
-) -> Floats:
-    """Return whitened prediction errors of several series at once.
-
-    Parameters
-    ----------
-    K, spread
-        From `gains`.
-    noise, integrals, blocks, columns, step_s
-        As given to `gains`.
-    series
-        Positions or velocities, shape (n, c, q).
-
-    Returns
-    -------
-    ndarray
-        Shape (n, c, q).
-    """
-    if series.shape[2] <= FEW:
-        return _errors_of_few(K, spread, noise, integrals, blocks, columns, step_s, series)
-    return _errors_of_many(K, spread, noise, integrals, blocks, columns, step_s, series)
-
-
 @compiled
 def _errors_of_few(
     K: Floats,
@@ -367,6 +336,38 @@ def _errors_of_many(
     return out
 
 
+@compiled
+def errors(
+    K: Floats,
+    spread: Floats,
+    noise: Floats,
+    integrals: int,
+    blocks: Floats,
+    columns: Floats,
+    step_s: float,
+    series: Floats,
+) -> Floats:
+    """Return whitened prediction errors of several series at once.
+
+    Parameters
+    ----------
+    K, spread
+        From `gains`.
+    noise, integrals, blocks, columns, step_s
+        As given to `gains`.
+    series
+        Positions or velocities, shape (n, c, q).
+
+    Returns
+    -------
+    ndarray
+        Shape (n, c, q).
+    """
+    if series.shape[2] <= FEW:
+        return _errors_of_few(K, spread, noise, integrals, blocks, columns, step_s, series)
+    return _errors_of_many(K, spread, noise, integrals, blocks, columns, step_s, series)
+
+
 @borrowing
 def begun_by(series: Floats, k: int, begun: int) -> int:
     """Return how many of the series, shape (n, c, q), have begun by a row: all up to the last that is not zero there.
@@ -394,52 +395,6 @@ def summed(gaps: Floats, integrals: int, step_s: float) -> Floats:
                     place[j, m] += moved
                     moved = place[j, m] * step_s
                 out[k, j, m] = moved
-    return out
-
-
-@compiled
-def errors_alone(K: Floats, spread: Floats, noise: Floats, integrals: int, step_s: float, series: Floats) -> Floats:
-    """Return `errors` of one channel that shares no disturbance, many times as fast.
-
-    Parameters
-    ----------
-    K, spread
-        From `gains`, shapes (n, 1, 5) and (n, 1).
-    noise, integrals, step_s
-        As given to it.
-    series
-        Positions or velocities, shape (n, q).
-
-    Returns
-    -------
-    ndarray
-        Shape (n, q).
-    """
-    n, q = series.shape
-    keep = kept(noise, step_s)
-    a, b, d, e, fade = keep[0, 0], keep[0, 1], keep[0, 2], keep[0, 3], keep[0, 4]
-    h, half = step_s, 0.5 * step_s * step_s
-    place, speed, wrong, rate, push = np.zeros(q), np.zeros(q), np.zeros(q), np.zeros(q), np.zeros(q)
-    out, begun = np.zeros((n, q)), 0
-    for k in range(n):
-        # As of `errors`.
-        for m in range(q - 1, begun - 1, -1):
-            if series[k, m] != 0.0:
-                begun = m + 1
-                break
-        to_place, to_speed, to_wrong, to_rate, to_push = K[k, 0, 0], K[k, 0, 1], K[k, 0, 2], K[k, 0, 3], K[k, 0, 4]
-        scale = spread[k, 0]
-        for m in range(begun):
-            # Read all, then write all: only so is this loop vectorised.
-            p, v, w, r, u = place[m], speed[m], wrong[m], rate[m], push[m]
-            error = series[k, m] - (p if integrals == 2 else v) - w
-            out[k, m] = error / scale
-            v, w, r, u = v + to_speed * error, w + to_wrong * error, r + to_rate * error, u + to_push * error
-            place[m] = p + to_place * error + (h * v + half * u)
-            speed[m] = v + h * u
-            wrong[m] = a * w + b * r
-            rate[m] = d * w + e * r
-            push[m] = fade * u
     return out
 
 
@@ -488,8 +443,8 @@ def whitened_alone(
 ) -> Floats:
     """Return whitened prediction errors of accelerations in channels that share no disturbance.
 
-    `errors_alone` of what they are `summed` up to, in one pass and channel by channel; those of the first steps of every
-    series, which only tell where it starts, are zero.
+    `errors` of what they are `summed` up to, in one pass, channel by channel and many times as fast; those of the first steps
+    of every series, which only tell where it starts, are zero.
 
     Parameters
     ----------
@@ -645,8 +600,7 @@ def whitened_together(
         first, end = runs[run, 0], runs[run, 1]
         series = summed(gaps[first:end], integrals, step_s)
         given = K[first:end], spread[first:end], noise, integrals, blocks, columns[first:end], step_s, series
-        left = _errors_of_few(*given) if gaps.shape[2] <= FEW else _errors_of_many(*given)
-        out[first + DIFFUSE : end] = left[DIFFUSE:]
+        out[first + DIFFUSE : end] = errors(*given)[DIFFUSE:]
     return out
 
 

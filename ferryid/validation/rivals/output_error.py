@@ -21,7 +21,7 @@ from ferryid.counts import counted
 from ferryid.diagnose import Estimate
 from ferryid.effects import Effect, effects
 from ferryid.effects.effect import HELD
-from ferryid.effects.equations_of_motion import masses, other_forces, solved
+from ferryid.effects.equations_of_motion import acceleration_in
 from ferryid.effects.force_model import COEFFICIENTS, ForceModel, Measurements, hull_of
 from ferryid.effects.hull_spread import default_hull_spread
 from ferryid.effects.measurements import hull_force_model
@@ -182,11 +182,7 @@ def _rates(
     if flow.shape[0] > 0:
         along = cosine * flow[i, 0] + sine * flow[i, 1]
         across = cosine * flow[i, 1] - sine * flow[i, 0]
-    mass = masses(i, hull, load)
-    X, Y, N = other_forces(i, mass, u - along, v - across, r, hull, external, factor)
-    for k in range(parts.shape[1]):
-        X, Y, N = X + parts[i, k, 0], Y + parts[i, k, 1], N + parts[i, k, 2]
-    a, b, c = solved(mass, X, Y, N)
+    a, b, c = acceleration_in(i, u - along, v - across, r, hull, parts, external, load, factor)
     out[0], out[1], out[2] = cosine * u - sine * v, sine * u + cosine * v, r
     # The body frame turns through the water.
     out[3], out[4], out[5] = a + r * across, b - r * along, c

@@ -12,7 +12,7 @@ from scipy.stats import chi2, multivariate_normal
 
 from ferryid.diagnose.inference.autoregression import ORDER, AutoregressiveNoise
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, fit
-from ferryid.diagnose.inference.kalman import DIFFUSE, FEW, errors, errors_alone, gains, predictions_alone, summed
+from ferryid.diagnose.inference.kalman import DIFFUSE, FEW, errors, gains, predictions_alone, summed, whitened_alone
 from ferryid.diagnose.inference.noise_estimation import _widths, excerpt, fit_noise
 from ferryid.diagnose.inference.noise_model import NoiseModel, likelihood, make_whitening_filter, stride_s
 from ferryid.diagnose.inference.thresholds import INFERENCE
@@ -109,9 +109,15 @@ def test_one_channel_alone_has_the_innovations_of_its_dense_covariance(row: Floa
     series = np.column_stack([own, 0.05 * np.cumsum(rng.standard_normal(n)), own[:, 0] + elsewhere])
     nothing, none = np.empty((n, 1, 0)), np.empty((0, 0))
     K, spread = gains(np.array([1.0]), row[None], integrals, none, np.empty((2, 0, 0)), nothing, h)
-    left = errors_alone(K, spread, row[None], integrals, h, series)
+    gaps, runs = np.diff(series, integrals, axis=0, prepend=np.zeros((integrals, 4))) / h**integrals, np.array([[0, n]])
+    left = whitened_alone(gaps[:, None], runs, K, spread, row[None], integrals, h)[:, 0]
     among = errors(K, spread, row[None], integrals, none, nothing, h, series[:, None])[:, 0]
-    np.testing.assert_allclose(left, among, rtol=1e-7, atol=1e-9)
+    assert not left[:DIFFUSE].any()
+    np.testing.assert_allclose(left[DIFFUSE:], among[DIFFUSE:], rtol=1e-7, atol=1e-9)
+    for m, one in enumerate(left.T):
+        # Of a single series the states stay in registers.
+        single = whitened_alone(gaps[:, None, m : m + 1].copy(), runs, K, spread, row[None], integrals, h)
+        np.testing.assert_allclose(single[:, 0, 0], one, rtol=1e-9, atol=1e-9)
     # Gauss: what is new in every step of a normal vector, over its standard deviation.
     D = contrasts(1, n, integrals)
     new = np.linalg.solve(np.linalg.cholesky(D @ (error + G @ push @ G.T) @ D.T), D @ series)
@@ -157,10 +163,10 @@ def test_predictions_under_several_noises_are_those_of_each_alone(integrals: int
         for a, b in runs.tolist():
             none, nothing = np.empty((0, 0)), np.empty((b - a, 1, 0))
             K, spread = gains(scale, row, integrals, none, np.empty((2, 0, 0)), nothing, h)
-            left = errors_alone(K, spread, row, integrals, h, summed(gaps[a:b], integrals, h)[:, 0])
+            left = errors(K, spread, row, integrals, none, nothing, h, summed(gaps[a:b], integrals, h))[:, 0]
             whitened, log_scales = (one[k, a:b] for one in every)
             assert np.ptp(left) > 1.0
-            np.testing.assert_allclose(whitened[DIFFUSE:], left[DIFFUSE:], rtol=1e-12)
+            np.testing.assert_allclose(whitened[DIFFUSE:], left[DIFFUSE:], rtol=1e-7, atol=1e-9)
             np.testing.assert_allclose(log_scales[DIFFUSE:], np.log(spread[DIFFUSE:]) * [[1.0, 1.0]], rtol=1e-12)
             assert not whitened[:DIFFUSE].any()
             assert not log_scales[:DIFFUSE].any()
