@@ -74,9 +74,12 @@ def parse_hull(reader: TableReader | None) -> Hull | None:
 
 def _spread(reader: TableReader) -> float:
     """Take how far off the coefficients are believed to be: a share of each, or that it is not known."""
-    if isinstance(reader.data.get("spread"), str):
-        return math.inf if reader.text("spread", options=(UNKNOWN,)) else math.nan
-    return reader.number("spread", above=0.0, at_most=MOST_SPREAD)
+    if not isinstance(reader.data.get("spread"), str):
+        return reader.number("spread", above=0.0, at_most=MOST_SPREAD)
+    given = reader.text("spread")
+    if given != UNKNOWN:
+        reader.fault(f'"spread" cannot be "{given}". Fix: give a share, such as 0.3 for 30 %, or "{UNKNOWN}"', "spread")
+    return math.inf
 
 
 def rigid_mass(mass_kg: float, x_g_m: float, inertia_z: float) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:

@@ -119,7 +119,11 @@ CASES = {
     ),
     "spread in percent": ("mass_kg = 1000.0", "mass_kg = 1000.0\nspread = 20@", "at most 1, found 20"),
     "spread of nothing": ("mass_kg = 1000.0", "mass_kg = 1000.0\nspread = 0.0@", "must be above 0"),
-    "spread in a word": ("mass_kg = 1000.0", 'mass_kg = 1000.0\nspread = "unknow"@', 'Did you mean "unknown"?'),
+    "spread in a word": (
+        "mass_kg = 1000.0",
+        'mass_kg = 1000.0\nspread = "unknow"@',
+        'give a share, such as 0.3 for 30 %, or "unknown"',
+    ),
     "spread without damping": (
         "mass_kg = 1000.0\ninertia_z = 2000.0\n[hull.M]\nm11 = 1200.0\nm22 = 1500.0\nm23 = 10.0\nm32 = 10.0\nm33 = 2500.0\n"
         '[hull.D]\n"X_u" = -20.0\n"Y_v" = -50.0\n"N_r" = -90.0\n',
