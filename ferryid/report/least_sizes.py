@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import inf
+from shlex import quote
 
 from ferryid.counts import counted
 from ferryid.diagnose.judging import Diagnosis, LeastSize
@@ -36,9 +37,8 @@ def proof(diagnosis: Diagnosis) -> str:
     """Return the command that measures such sizes in the log itself."""
     names: Sequence[str] = list(dict.fromkeys(one.effect for one in diagnosis.least_sizes))
     wanted = [name for name in ("wind", "payload") if name in names] or list(names[:2])
-    return (
-        f"ferryid prove --real {diagnosis.path or diagnosis.log} --vessel {diagnosis.vessel} --only {','.join(wanted)}"
-    )
+    recording, vessel = quote(diagnosis.path or diagnosis.log), quote(diagnosis.profile or diagnosis.vessel)
+    return f"ferryid prove --real {recording} --vessel {vessel} --only {','.join(wanted)}"
 
 
 def _short(one: LeastSize) -> str:

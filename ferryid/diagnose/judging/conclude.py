@@ -104,8 +104,14 @@ def _with_origin(
     diagnosis: Diagnosis, log: AveragedLog, together: JudgedCampaign | None, copied: str | None
 ) -> Diagnosis:
     """Return a diagnosis with the path of its log, and with what the log teaches as one of a campaign."""
-    repairs = log.screened.measured.survey.repairs
-    diagnosis = replace(diagnosis, path=log.path, copy=copied is not None, repairs=repairs)
+    screened = log.screened
+    diagnosis = replace(
+        diagnosis,
+        path=log.path,
+        profile=screened.measurements.profile.given_as,
+        copy=copied is not None,
+        repairs=screened.measured.survey.repairs,
+    )
     if together is None:
         return diagnosis
     if copied is not None:

@@ -118,6 +118,8 @@ class Diagnosis:
         What a fit learned beside the findings; None where nothing was to be learned.
     path
         Of the log, as it was given.
+    profile
+        Name or path that the vessel's profile is given by.
     copy
         True for a log that holds the motion of another one before it.
     likeness
@@ -155,6 +157,7 @@ class Diagnosis:
     left_out: tuple[LeftOut, ...] = ()
     learned: Learned | None = None
     path: str = ""
+    profile: str = ""
     copy: bool = False
     likeness: Likeness | None = None
     likeness_of_all: Likeness | None = None

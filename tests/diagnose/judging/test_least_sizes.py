@@ -89,3 +89,5 @@ def test_a_terminal_has_a_line_on_the_largest_of_several_thrusters() -> None:
         "other2 below 12 % (and 2 effects more in the report)"
     )
     assert shown.proof(made) == "ferryid prove --real log.bag --vessel boat --only wind"
+    own = replace(made, path="sea trial/log.bag", profile="boats/vessel.toml")
+    assert shown.proof(own) == "ferryid prove --real 'sea trial/log.bag' --vessel boats/vessel.toml --only wind"
