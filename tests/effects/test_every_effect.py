@@ -30,9 +30,12 @@ vessel = "milliampere"
 path = { kind = "twelve-corner", dwell_s = DWELL_S }
 controller = { delta = 0.7, sigma = 0.7 }
 """
-DWELL_S = {"shallow_water": 60.0}
-"""Where the time at a corner must be longer than `BRIEF_S` for an effect to be sized: a place has edges to be crossed."""
-BRIEF_S = 40.0
+DWELL_S = {"shallow_water": 60.0} | dict.fromkeys(("external_push", "hull_parameters", "payload", "fouling"), 40.0)
+"""Where the time at a corner must be longer than `BRIEF_S` for an effect to be sized: a place has edges to be crossed, what
+passes must be seen before and after, and what trades with the hull needs more to be told from it."""
+BRIEF_S = 20.0
+LONGER_S = 40.0
+"""Where nothing acts: what chance does is to be seen in more of it."""
 BOTH_WAYS = ("astern_asymmetry",)
 """Effects of what milliAmpère never does: its thrusters turn round instead of running astern."""
 HULL = ("m11", "m22", "m33", "X_u", "X_|u|u", "Y_v", "Y_|v|v", "Y_|r|v", "Y_|v|r", "N_r", "N_|r|r", "N_|r|v")
@@ -143,13 +146,13 @@ def test_a_hull_model_that_is_wrong_all_over_is_named(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_nothing_is_found_where_nothing_acts(seed: int, tmp_path: Path) -> None:
-    result = found_in({}, seed, tmp_path)
+    result = found_in({}, seed, tmp_path, LONGER_S)
     assert result.fit.candidates == ()
     assert result.rounds[0].none > 0.9
 
 
 def test_nothing_is_found_of_sound_propellers_that_run_astern(tmp_path: Path) -> None:
-    result = found_in({}, 3, tmp_path, vessel=load_profile(write(tmp_path)))
+    result = found_in({}, 3, tmp_path, LONGER_S, load_profile(write(tmp_path)))
     assert result.fit.candidates == ()
     assert "astern_asymmetry" not in result.untested
 
