@@ -39,6 +39,13 @@ def calm(tmp_path_factory: pytest.TempPathFactory) -> EstimationProblem:
     return trial_on(sailed(tmp_path_factory.mktemp("calm"), "calm", TWELVE, 5))
 
 
+@pytest.fixture(scope="module")
+def longer(tmp_path_factory: pytest.TempPathFactory) -> EstimationProblem:
+    """A trial of half as much time again, for a growth to be told."""
+    text = TWELVE.replace("dwell_s = 40", "dwell_s = 60")
+    return trial_on(sailed(tmp_path_factory.mktemp("longer"), "longer", text, 5))
+
+
 def narrow_band(t: Floats, step_s: float, seed: int = 3) -> Floats:
     """Return a narrow-band process of unit variance, shape (n,)."""
     rng = np.random.default_rng(seed)
@@ -114,10 +121,12 @@ def test_a_wake_of_a_minute_is_found_with_its_times(calm: EstimationProblem) -> 
 
 
 @pytest.mark.slow
-def test_waves_that_grow_are_found_with_their_growth_and_even_ones_without(calm: EstimationProblem) -> None:
-    t = calm.plain.measurements.t
+def test_waves_that_grow_are_found_with_their_growth_and_even_ones_without(
+    calm: EstimationProblem, longer: EstimationProblem
+) -> None:
+    t = longer.plain.measurements.t
     # Estimated once, beside noise and waves of even strength, it is 2.5 (1.5 to 4.2).
-    case = shaken(calm, 150.0, np.interp(t, t[[0, -1]], [0.25, 1.5]), seed=12)
+    case = shaken(longer, 150.0, np.interp(t, t[[0, -1]], [0.25, 1.5]), seed=12)
     growth = waves_in(case)[1][0].times["growth"]
     assert growth.low < 6.0 < growth.high
     assert abs(growth.value / 6.0 - 1.0) < 0.3

@@ -29,7 +29,7 @@ from tests.diagnose.trials import sailed, trial_on
 TWELVE = """
 schema = "ferryid.scenario/1"
 vessel = "milliampere"
-path = { kind = "twelve-corner" }
+path = { kind = "twelve-corner", dwell_s = 40 }
 controller = { delta = 0.7, sigma = 0.7 }
 sensors = { imu_rate_hz = 0.0, camera_rate_hz = 0.0 }
 """
@@ -135,48 +135,48 @@ def test_in_a_gap_nothing_begins_or_ends() -> None:
 
 @pytest.mark.slow
 def test_a_load_that_leaves_is_no_fault_of_the_thrusters(tmp_path: Path) -> None:
-    load = "[[payload]]\nmass_kg = 300\nx_m = 0.6\nuntil_s = 400\n"
+    load = "[[payload]]\nmass_kg = 300\nx_m = 0.6\nuntil_s = 280\n"
     case = trial_on(sailed(tmp_path, "leaves", TWELVE + load, 5))
     known = [one for one in list_candidates(case.plain.measurements)[0] if one.effect.onset and not one.effect.unsteady]
     found = search(case, lambda stage: None, known=known).fit
     assert [one.key for one in found.candidates] == [("payload", None)]
     (one,) = found.candidates
     assert one.onset_s == 0.0
-    assert one.offset_s == pytest.approx(400.0, abs=5.0)
+    assert one.offset_s == pytest.approx(280.0, abs=5.0)
     assert found.values[0] == pytest.approx([300.0, 0.6], rel=0.1)
 
 
 @pytest.mark.slow
 def test_a_fault_that_passes_is_found_with_both_its_ends(tmp_path: Path) -> None:
-    fault = '[[thrusters.faults]]\nthruster = "thruster2"\nfactor = 0.55\nfrom_s = 260\nuntil_s = 400\n'
+    fault = '[[thrusters.faults]]\nthruster = "thruster2"\nfactor = 0.55\nfrom_s = 180\nuntil_s = 290\n'
     case = trial_on(sailed(tmp_path, "passes", TWELVE + fault, 6))
     known = [one for one in list_candidates(case.plain.measurements)[0] if one.effect.onset and not one.effect.unsteady]
     found = search(case, lambda stage: None, known=known).fit
     assert [one.key for one in found.candidates] == [("thruster_gain", "thruster2")]
     (one,) = found.candidates
-    assert (one.onset_s, one.offset_s) == (pytest.approx(260.0, abs=5.0), pytest.approx(400.0, abs=5.0))
+    assert (one.onset_s, one.offset_s) == (pytest.approx(180.0, abs=5.0), pytest.approx(290.0, abs=5.0))
     assert found.values[0] == pytest.approx([0.55], abs=0.03)
 
 
 @pytest.mark.slow
 def test_a_current_that_sets_in_is_found_with_its_beginning(tmp_path: Path) -> None:
-    current = "[environment.current]\nnorth_mps = 0.1\neast_mps = -0.12\nfrom_s = 300\n"
+    current = "[environment.current]\nnorth_mps = 0.1\neast_mps = -0.12\nfrom_s = 210\n"
     case = trial_on(sailed(tmp_path, "sets in", TWELVE + current, 5))
     known = [one for one in list_candidates(case.plain.measurements)[0] if one.effect.onset and not one.effect.unsteady]
     found = search(case, lambda stage: None, known=known).fit
     assert [one.key for one in found.candidates] == [("current", None)]
     (one,) = found.candidates
-    assert (one.onset_s, one.offset_s) == (pytest.approx(300.0, abs=5.0), inf)
+    assert (one.onset_s, one.offset_s) == (pytest.approx(210.0, abs=5.0), inf)
     assert found.values[0] == pytest.approx([0.1, -0.12], abs=0.02)
 
 
 @pytest.mark.slow
 def test_a_wind_that_gets_up_is_found_with_its_beginning(tmp_path: Path) -> None:
-    wind = "[environment.wind]\nnorth_mps = -3.0\neast_mps = 4.0\nfrom_s = 300\n"
+    wind = "[environment.wind]\nnorth_mps = -3.0\neast_mps = 4.0\nfrom_s = 210\n"
     case = trial_on(sailed(tmp_path, "gets up", TWELVE + wind, 5))
     known = [one for one in list_candidates(case.plain.measurements)[0] if one.effect.onset and not one.effect.unsteady]
     found = search(case, lambda stage: None, known=known).fit
     assert [one.key for one in found.candidates] == [("wind", None)]
     (one,) = found.candidates
-    assert (one.onset_s, one.offset_s) == (pytest.approx(300.0, abs=5.0), inf)
+    assert (one.onset_s, one.offset_s) == (pytest.approx(210.0, abs=5.0), inf)
     assert found.values[0][:2] == pytest.approx([-3.0, 4.0], abs=0.4)

@@ -36,11 +36,11 @@ FIXTURES = Path(__file__).resolve().parents[3] / "fixtures"
 BASE = """
 schema = "ferryid.scenario/1"
 vessel = "milliampere"
-path = { kind = "twelve-corner", dwell_s = 40 }
+path = { kind = "twelve-corner", dwell_s = 26 }
 controller = { delta = 0.7, sigma = 0.7 }
 sensors = { imu_rate_hz = 0.0, camera_rate_hz = 0.0 }
 """
-FAULT = 'thrusters = { faults = [ { thruster = "thruster1", factor = 0.8, from_s = 240.0 } ] }\n'
+FAULT = 'thrusters = { faults = [ { thruster = "thruster1", factor = 0.8, from_s = 160.0 } ] }\n'
 HULL = ("m11", "m22", "m33", "X_u", "X_|u|u", "Y_v", "Y_|v|v", "Y_|r|v", "Y_|v|r", "N_r", "N_|r|r", "N_|r|v")
 
 
@@ -48,8 +48,8 @@ def wind(north: float) -> str:
     return f"environment = {{ wind = {{ north_mps = {north}, east_mps = 0.0 }} }}\n"
 
 
-def sailed(folder: Path, name: str, tables: str, seed: int, hull: float = 1.0, dwell_s: int = 40) -> str:
-    text = BASE.replace("dwell_s = 40", f"dwell_s = {dwell_s}")
+def sailed(folder: Path, name: str, tables: str, seed: int, hull: float = 1.0, dwell_s: int = 26) -> str:
+    text = BASE.replace("dwell_s = 26", f"dwell_s = {dwell_s}")
     scenario = replace(parse_scenario(text + tables, name), true_hull=dict.fromkeys(HULL, hull) if hull != 1.0 else {})
     write_log(simulate(scenario, seed), folder / f"{name}.mcap")
     return str(folder / f"{name}.mcap")
@@ -85,7 +85,7 @@ def test_only_the_fault_is_found_where_both_have_the_wind(folder: Path, windy: s
     (fault,) = result.findings
     assert (fault.effect, fault.instance) == ("thruster_gain", "thruster1")
     assert fault.parameters["factor"].value == pytest.approx(0.8, abs=0.02)
-    assert fault.parameters["onset"].low - 1.0 <= 240.0 <= fault.parameters["onset"].high + 1.0
+    assert fault.parameters["onset"].low - 1.0 <= 160.0 <= fault.parameters["onset"].high + 1.0
     (condition,) = result.against["conditions"]
     assert condition["effect"] == "wind"
     assert condition["parameters"]["north"]["value"] == pytest.approx(2.0, abs=0.1)

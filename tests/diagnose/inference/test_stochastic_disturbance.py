@@ -26,7 +26,7 @@ FERRY = load_profile("milliampere")
 BASE = """
 schema = "ferryid.scenario/1"
 vessel = "milliampere"
-path = { kind = "twelve-corner" }
+path = { kind = "twelve-corner", dwell_s = 40 }
 controller = { delta = 0.7, sigma = 0.7 }
 sensors = { imu_rate_hz = 0.0, camera_rate_hz = 0.0 }
 """
