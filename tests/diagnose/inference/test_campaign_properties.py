@@ -23,11 +23,11 @@ BAG_WINDOWS = 7
 
 
 def bags(whole: Campaign) -> Campaign:
-    """Return a campaign cut into bags of twenty seconds."""
+    """Return a campaign cut into bags of twenty seconds, with as much between two of them."""
     members: list[Member] = []
     for member in whole.members:
         seen = member.windows
-        for first in range(0, len(seen.starts) - BAG_WINDOWS, BAG_WINDOWS + 3):
+        for first in range(0, len(seen.starts) - BAG_WINDOWS, 2 * (BAG_WINDOWS + 3)):
             rows = slice(first, first + BAG_WINDOWS)
             cut = Windows(
                 seen.measurements,

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.slow
 TRIAL = """
 schema = "ferryid.scenario/1"
 vessel = "milliampere"
-path = { kind = "twelve-corner", dwell_s = 40 }
+path = { kind = "twelve-corner", dwell_s = 26 }
 controller = { delta = 0.7, sigma = 0.7 }
 sensors = { imu_rate_hz = 0.0, camera_rate_hz = 0.0 }
 thrusters = { inflow_loss_per_mps = 0.25, faults = [{ thruster = "thruster1", factor = 1.26 }] }

@@ -110,19 +110,30 @@ def windy(folder: Path) -> tuple[str, Model]:
     return log, replace(blank, conditions=(Conditions("windy", sha256, (named(sha256, north=-3.0, east=2.0),)),))
 
 
+@pytest.fixture(scope="module")
+def taught(windy: tuple[str, Model], folder: Path) -> tuple[Model, Diagnosis]:
+    """Return what is learned from the log in wind beside the named wind."""
+    stored, told = learned_on(windy[0], folder, windy[1])
+    assert stored is not None
+    return stored, told
+
+
+@pytest.fixture(scope="module")
+def another(folder: Path) -> str:
+    """Return a log of the same vessel in still air, on another path at twice the speed."""
+    return sailed(folder, "another", BRISK, 111, DAMPED)
+
+
 def prepare_sha256(log: str, folder: Path) -> str:
     return prepare(log, FERRY, folder, window_s=1.0).recording.sha256
 
 
 def test_what_is_learned_beside_a_named_wind_serves_another_log_as_well_as_a_fit(
-    windy: tuple[str, Model], folder: Path
+    windy: tuple[str, Model], taught: tuple[Model, Diagnosis], another: str, folder: Path
 ) -> None:
-    log, diagnosed = windy
-    stored, _ = learned_on(log, folder, diagnosed)
-    assert stored is not None
-    other = sailed(folder, "yet another", BRISK, 111, DAMPED)
+    log, stored = windy[0], taught[0]
     fitted = fit_logs([log], FERRY, QUICK, RunContext(folder)).model
-    ours, theirs = errors_on(other, folder, stored, fitted)
+    ours, theirs = errors_on(another, folder, stored, fitted)
     assert ours <= 1.02 * theirs
 
 
@@ -141,10 +152,11 @@ def test_the_load_of_a_named_wind_goes_with_the_velocity(
     np.testing.assert_allclose((found.motion.tau - motion.tau)[motion.valid], blown - still, atol=1e-6)
 
 
-def test_wind_is_named_and_damping_is_learned(windy: tuple[str, Model], folder: Path) -> None:
+def test_wind_is_named_and_damping_is_learned(
+    windy: tuple[str, Model], taught: tuple[Model, Diagnosis], another: str, folder: Path
+) -> None:
     log, diagnosed = windy
-    stored, told = learned_on(log, folder, diagnosed)
-    assert stored is not None
+    stored, told = taught
     assert told.learned is not None
     assert told.learned.accepted, told.learned.says
     assert stored.accepted
@@ -161,8 +173,7 @@ def test_wind_is_named_and_damping_is_learned(windy: tuple[str, Model], folder: 
     assert set(plain["over_fit"]) == set(plain["per_axis"]) == set(AXES)
     assert np.mean(list(plain["over_fit"].values())) <= 1.02
 
-    other = sailed(folder, "other", BRISK, 111, DAMPED)
-    base, alone, ours = errors_on(other, folder, blank_model(FERRY, "base"), diagnosed, stored)
+    base, alone, ours = errors_on(another, folder, blank_model(FERRY, "base"), diagnosed, stored)
     assert ours < 0.8 * base
     assert ours < 0.8 * alone
     # The commands see the same model.
@@ -174,10 +185,8 @@ def test_wind_is_named_and_damping_is_learned(windy: tuple[str, Model], folder: 
     assert entry["mse"]["base"] == pytest.approx(base)
 
 
-def test_what_was_learned_is_exported_and_simulated(windy: tuple[str, Model], folder: Path) -> None:
-    log, diagnosed = windy
-    stored, _ = learned_on(log, folder, diagnosed)
-    assert stored is not None
+def test_what_was_learned_is_exported_and_simulated(taught: tuple[Model, Diagnosis], folder: Path) -> None:
+    stored, _ = taught
     made = export_model(stored.label, "python", folder)
     run = subprocess.run([sys.executable, made["file"]], capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr

@@ -175,7 +175,8 @@ def test_a_property_found_in_one_log_holds_in_another(model: Model, folder: Path
 
 def test_the_wind_of_one_log_is_not_that_of_another(model: Model, fouled: str, folder: Path) -> None:
     calm = sailed(folder, "calm", BRISK, 9, FOULED)
-    here, there = (judged(model, log, folder / "out")["logs"][0] for log in (fouled, calm))
+    told_here, told_there = (judged(model, log, folder / "out") for log in (fouled, calm))
+    here, there = told_here["logs"][0], told_there["logs"][0]
     assert [one["effect"] for one in here["effects"]["conditions"]] == ["wind"]
     without = replace(model, conditions=())
     blind = judged(without, fouled, folder / "out")["logs"][0]
@@ -186,7 +187,7 @@ def test_the_wind_of_one_log_is_not_that_of_another(model: Model, fouled: str, f
     forged = replace(model, conditions=(replace(model.conditions[0], sha256=there["sha256"]),))
     harmed = judged(forged, calm, folder / "out")["logs"][0]
     assert harmed["mse"]["model"]["sway"] > 1.2 * there["mse"]["model"]["sway"]
-    text = render_evaluation(judged(model, fouled, folder / "out"))
+    text = render_evaluation(told_here)
     assert "acts, as in every log: Damping at speed has changed" in text
     assert "acts, as in this log: A steady wind" in text
 
