@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ferryid.diagnose import check_withheld
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.identify import FitSettings
 from ferryid.vessel.toml_lines import KeyPath, key_lines, line_of, too_deep
@@ -108,7 +107,7 @@ class _Reader:
         self._known(diagnose, ("diagnose",), ("withhold", "versus"))
         withhold = self._texts(diagnose, ("diagnose", "withhold"), ())
         try:
-            check_withheld(withhold)
+            _check_withheld(withhold)
         except FerryIdError as error:
             raise self._fault(("diagnose", "withhold"), str(error)) from error
         versus = self._yes_or_no(diagnose, ("diagnose", "versus"))
@@ -163,6 +162,17 @@ class _Reader:
 
     def _fault(self, place: KeyPath, says: str) -> FerryIdError:
         return FerryIdError(f"{self._path}:{line_of(self._lines, place)}: {says}")
+
+
+def _check_withheld(withhold: Sequence[str]) -> None:
+    """Refuse what cannot be withheld.
+
+    The diagnosis is loaded where there is something to look up: every process of a batch loads recipes.
+    """
+    if withhold:
+        from ferryid.diagnose import check_withheld
+
+        check_withheld(withhold)
 
 
 def _numbers(values: Any) -> bool:

@@ -7,19 +7,19 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ferryid.batch.log_result import StepSummary
 from ferryid.batch.recipe import Recipe
-from ferryid.compare import evaluate
-from ferryid.diagnose import DiagnosisSettings
 from ferryid.files import dump_json, finite, write_text
-from ferryid.identify import load_block_sums, load_windows
-from ferryid.models import Model, blank_model
 from ferryid.report.batch_rows import BaseAndModel, DiagnosisSummary, EvaluationSummary, FindingSummary, FitSummary
-from ferryid.report.diagnosis_report import diagnose_and_report
-from ferryid.report.fit_report import fit_and_report
 from ferryid.types import RunContext, TimeRanges
 from ferryid.vessel.profile import Profile
+
+if TYPE_CHECKING:
+    from ferryid.models import Model
+
+# Each step loads what it needs: a process that only fits loads no diagnosis, which takes a second.
 
 LONGEST_NAME = 80
 
@@ -75,6 +75,9 @@ class Job:
 
 
 def _fitted(job: Job) -> FitSummary:
+    from ferryid.identify import load_block_sums, load_windows
+    from ferryid.report.fit_report import fit_and_report
+
     page = job.recipe.fit_report
     made = fit_and_report([job.log], job.profile, job.recipe.fit, job.context, name=job.model_name(), page=page)
     # What a fit over the whole archive adds up is made here, where logs are worked on side by side.
@@ -98,6 +101,9 @@ def _fitted(job: Job) -> FitSummary:
 
 
 def _evaluated(job: Job) -> EvaluationSummary:
+    from ferryid.compare import evaluate
+    from ferryid.models import blank_model
+
     model = job.model or blank_model(job.profile, job.profile.name)
     told = evaluate(model, [job.log], job.context, profile=job.profile)
     write_text(job.folder / "evaluation.json", dump_json(told))
@@ -113,6 +119,9 @@ def _evaluated(job: Job) -> EvaluationSummary:
 
 
 def _diagnosed(job: Job) -> DiagnosisSummary:
+    from ferryid.diagnose import DiagnosisSettings
+    from ferryid.report.diagnosis_report import diagnose_and_report
+
     words = ["ferryid", "diagnose", job.log, *(["--vessel", job.vessel] if job.vessel else [])]
     words += [word for option in _range_words(job.ranges) for word in option]
     words += [word for signal in job.recipe.withhold for word in ("--withhold", signal)]

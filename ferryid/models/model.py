@@ -116,6 +116,11 @@ class Model:
         return bool(self.hull or self.vessel_effects or self.conditions)
 
     @property
+    def blank(self) -> bool:
+        """True where nothing is added to the base model."""
+        return not (self.diagnosed or self.terms) and self.settings["basis"] == NO_BASIS
+
+    @property
     def learned(self) -> bool:
         """True where terms were learned beside a diagnosis."""
         return self.diagnosed and bool(self.settings.get("learned", False))

@@ -1,16 +1,12 @@
-"""A small archive, its recipe, and work that goes wrong where it is told to."""
+"""A small archive and its recipe."""
 
 from __future__ import annotations
 
 import json
-import os
 import shutil
-import signal
 from pathlib import Path
 from typing import Any
 
-from ferryid.batch import task
-from ferryid.batch.log_result import LogResult
 from ferryid.batch.run import batch
 from ferryid.report.batch_rows import BatchResult
 
@@ -53,20 +49,3 @@ def same(result: BatchResult) -> str:
     """Return what two runs must agree on: all rows but time and memory."""
     rows = [{k: v for k, v in row.items() if k not in ("seconds", "peak_bytes")} for row in result.to_json()["rows"]]
     return json.dumps(rows, indent=1)
-
-
-def blank(one: task.Task) -> LogResult:
-    """Work, and leave figures blank, as tests do that look at none."""
-    from matplotlib.backends.backend_svg import FigureCanvasSVG
-
-    from tests.conftest import BLANK
-
-    FigureCanvasSVG.print_svg = lambda canvas, file, **options: file.write(BLANK)  # type: ignore[method-assign]
-    return task.work(one)
-
-
-def deadly(one: task.Task) -> LogResult:
-    """Work, but die at once at a log of that name."""
-    if "deadly" in one.name:
-        os.kill(os.getpid(), signal.SIGKILL)
-    return task.work(one)

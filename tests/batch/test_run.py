@@ -5,12 +5,14 @@ from __future__ import annotations
 import errno
 import json
 import os
+import pickle
 import shutil
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,15 +22,15 @@ import pytest
 
 from ferryid.batch import kept, steps, task
 from ferryid.batch import run as running
-from ferryid.batch.log_result import LogFile, StepSummary
+from ferryid.batch.log_result import LogFile, LogResult, StepSummary
 from ferryid.batch.remaining import Remaining, told_time
-from ferryid.batch.spread import spread
+from ferryid.batch.spread import _Pool, spread
 from ferryid.errors import FerryIdError, UnwritableError
 from ferryid.files import dump_json, unwritable
 from ferryid.report.batch_rows import BatchResult
 from ferryid.vessel import load_profile
-from tests.batch.archive import archive, blank, deadly, recipe, rows_of, run, same
-from tests.batch.work import children_of, default_interrupts, ended, environment
+from tests.batch.archive import archive, recipe, rows_of, run, same
+from tests.batch.work import blank, children_of, deadly, default_interrupts, ended, environment
 from tests.cli.test_every_command import conforms
 
 pytestmark = pytest.mark.slow
@@ -91,13 +93,40 @@ def test_a_bad_log_is_a_row_and_the_rest_goes_on(tmp_path: Path) -> None:
     assert len(set(before.items()) - set(rows_of(tmp_path).items())) == 2
 
 
+LOADED = """
+import pickle, sys
+from ferryid.batch import task
+with open(sys.argv[1], "rb") as file:
+    print(task.work(pickle.load(file)).status)
+print(*sorted({".".join(name.split(".")[:2]) for name in sys.modules}))
+"""
+
+
+def test_a_process_that_evaluates_loads_no_diagnosis_and_draws_nothing(one: task.Task, tmp_path: Path) -> None:
+    (tmp_path / "task").write_bytes(pickle.dumps(one))
+    words = [sys.executable, "-c", LOADED, str(tmp_path / "task")]
+    run = subprocess.run(words, capture_output=True, text=True, check=True, env=environment())
+    status, loaded = run.stdout.splitlines()
+    assert status == "done"
+    assert not {"ferryid.diagnose", "matplotlib", "jinja2", "pandas", "numba"} & set(loaded.split())
+
+
+@pytest.fixture(scope="module")
+def two_processes() -> Iterator[_Pool]:
+    """Two other processes, which are started once: each loads for a second or two what a log needs."""
+    pool = _Pool(2)
+    yield pool
+    pool.end()
+
+
 @pytest.fixture
-def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave figures blank in the processes of a batch as well."""
+def elsewhere(monkeypatch: pytest.MonkeyPatch, two_processes: _Pool) -> None:
+    """Work in these processes, and leave figures blank there as well."""
+    monkeypatch.setattr(running, "spread", lambda processes, dask, *, apart: nullcontext(two_processes))
     monkeypatch.setattr(running, "work", blank)
 
 
-@pytest.mark.usefixtures("undrawn")
+@pytest.mark.usefixtures("elsewhere")
 def test_every_step_of_one_log(tmp_path: Path) -> None:
     logs = archive(tmp_path, 1)
     recipe(tmp_path, '[fit]\ndelta = 0.4\nsigma = 0.4\naccept = "thesis"\ndraws = 20\n')
@@ -228,6 +257,8 @@ def test_a_log_that_kills_its_process_is_a_row(tmp_path: Path, monkeypatch: pyte
     assert statuses(result) == {"day0": "done", "day2": "done", "deadly": "lost"}
     assert any(line.startswith(f"lost: {logs / 'deadly.mcap'}: its process died") for line in told)
     monkeypatch.undo()
+    # It kills no more, and this process does as well.
+    monkeypatch.setattr(running, "spread", lambda processes, dask, *, apart: spread())
     kept_ones, _ = run(tmp_path, logs / "*.mcap")
     assert statuses(kept_ones)["deadly"] == "lost"
     # With more memory it is worth another try.
@@ -236,17 +267,47 @@ def test_a_log_that_kills_its_process_is_a_row(tmp_path: Path, monkeypatch: pyte
     assert more.counts["done_before"] == 2
 
 
-@pytest.fixture
-def one(tmp_path: Path) -> task.Task:
+@pytest.fixture(scope="module")
+def asked(tmp_path_factory: pytest.TempPathFactory) -> task.Task:
     """Return the task of one log, for this process."""
-    logs = archive(tmp_path, 1)
-    recipe(tmp_path)
+    folder = tmp_path_factory.mktemp("one")
+    logs = archive(folder, 1)
+    recipe(folder)
     tasks: list[task.Task] = []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(running, "_carry_out", lambda these, *rest: tasks.extend(these) or 1 / 0)
         with pytest.raises(ZeroDivisionError):
-            run(tmp_path, logs / "*.mcap")
+            run(folder, logs / "*.mcap")
     return tasks[0]
+
+
+@pytest.fixture
+def one(asked: task.Task, tmp_path: Path) -> task.Task:
+    """Return the task with folders of its own, in which nothing is done."""
+    return replace(asked, folder=tmp_path / "results" / asked.folder.name, tables=tmp_path / "out")
+
+
+@pytest.fixture(scope="module")
+def carried_out(asked: task.Task) -> LogResult:
+    """Return the row of the task; what came of it is in its folders."""
+    return task.work(asked)
+
+
+@pytest.fixture
+def done(asked: task.Task, carried_out: LogResult, one: task.Task) -> task.Task:
+    """Return the task with copies of the folders in which it is done."""
+    assert carried_out.status == "done", carried_out.reason
+    shutil.copytree(asked.folder, one.folder)
+    shutil.copytree(asked.tables / "logs", one.tables / "logs")
+    return one
+
+
+@pytest.fixture
+def again(carried_out: LogResult, monkeypatch: pytest.MonkeyPatch) -> list[steps.Job]:
+    """Return what is evaluated from now on, without doing it: for whether it is done, not for what comes of it."""
+    found: list[steps.Job] = []
+    monkeypatch.setitem(steps.CARRY_OUT, "evaluate", lambda job: found.append(job) or carried_out.evaluate)
+    return found
 
 
 def failing(error: Callable[[], BaseException]) -> Any:
@@ -320,9 +381,6 @@ def test_more_memory_than_there_may_be(one: task.Task, monkeypatch: pytest.Monke
 
     monkeypatch.setitem(steps.CARRY_OUT, "evaluate", greedy)
     assert task.work(one).status == "memory"
-
-
-COMMAND = "import sys; from ferryid.cli.main import main; main()"
 
 
 def started(folder: Path, *options: str) -> subprocess.Popen[str]:
@@ -408,6 +466,29 @@ def test_interrupted_it_keeps_what_is_done(tmp_path: Path, number: signal.Signal
     assert 1 <= len(rows_of(tmp_path)) < 6
 
 
+TWICE = """
+import subprocess, sys
+from pathlib import Path
+from ferryid.cli.main import main
+
+def carry_out():
+    try:
+        main()
+    except SystemExit as end:
+        if end.code:
+            print("code", end.code, flush=True)
+
+# A process of the batch imports this file too.
+if __name__ == "__main__":
+    disk = Path(sys.argv.pop(1))
+    carry_out()
+    print(len(list(disk.glob("out/batch/results/*/row.json"))), flush=True)
+    subprocess.run(["mount", "-o", "remount,size=60m", disk], check=True)
+    carry_out()
+"""
+"""A command on a full disk, and again when there is space; in one process, as most of its time goes to loading."""
+
+
 def test_on_a_disk_that_is_full_it_stops_and_goes_on_when_there_is_space(tmp_path: Path) -> None:
     (tmp_path / "disk").mkdir()
     small = ["unshare", "-rm", "sh", "-ec"]
@@ -421,14 +502,12 @@ def test_on_a_disk_that_is_full_it_stops_and_goes_on_when_there_is_space(tmp_pat
         pytest.skip("no disk of our own can be mounted here")
     archive(tmp_path, 4)
     recipe(tmp_path)
-    command = f"{sys.executable} -c '{COMMAND}' batch '{tmp_path}/season/*.mcap' --vessel milliampere --processes 1 "
-    command += f"--recipe {tmp_path}/recipe.toml --out {tmp_path}/disk/out"
+    program = tmp_path / "twice.py"
+    program.write_text(TWICE, encoding="utf-8")
+    words = f"batch '{tmp_path}/season/*.mcap' --vessel milliampere --processes 1 --recipe {tmp_path}/recipe.toml"
     script = f"""
 mount -t tmpfs -o size=700k tmpfs {tmp_path}/disk
-{command} || echo code $?
-ls {tmp_path}/disk/out/batch/results/*/row.json | wc -l
-mount -o remount,size=60m {tmp_path}/disk
-{command}
+{sys.executable} {program} {tmp_path}/disk {words} --out {tmp_path}/disk/out
 """
     done = subprocess.run([*small, script], capture_output=True, text=True, env=environment())
     lines = done.stdout.splitlines()
@@ -473,18 +552,20 @@ def test_two_at_once_do_not_share_a_folder(tmp_path: Path) -> None:
         run(tmp_path, logs / "*.mcap")
 
 
-def test_a_task_that_somebody_else_has_done_meanwhile_is_not_done_again(one: task.Task) -> None:
-    row = task.work(one)
-    state = (one.folder / "row.json").stat()
-    assert task.work(one) == row
-    assert (one.folder / "row.json").stat().st_ino == state.st_ino
-    changed = replace(one, files=(LogFile(one.files[0].path, 1, 1),))
+def test_a_task_that_somebody_else_has_done_meanwhile_is_not_done_again(
+    done: task.Task, carried_out: LogResult, again: list[steps.Job]
+) -> None:
+    state = (done.folder / "row.json").stat()
+    assert task.work(done) == carried_out
+    assert (done.folder / "row.json").stat().st_ino == state.st_ino
+    assert not again
+    changed = replace(done, files=(LogFile(done.files[0].path, 1, 1),))
     assert task.work(changed).files == changed.files
+    assert len(again) == 1
 
 
-def test_what_is_begun_to_be_removed_counts_no_more(one: task.Task, monkeypatch: pytest.MonkeyPatch) -> None:
-    task.work(one)
-    (one.folder / "reports").mkdir()
+def test_what_is_begun_to_be_removed_counts_no_more(done: task.Task, monkeypatch: pytest.MonkeyPatch) -> None:
+    (done.folder / "reports").mkdir()
 
     def denied(path: Path) -> None:
         raise OSError(errno.EACCES, "no")
@@ -493,30 +574,30 @@ def test_what_is_begun_to_be_removed_counts_no_more(one: task.Task, monkeypatch:
     # Whatever comes first in the folder, the row has gone before it.
     monkeypatch.setattr(Path, "iterdir", lambda folder: iter([folder / "reports", folder / "row.json"]))
     with pytest.raises(UnwritableError):
-        kept.clear(one.folder)
+        kept.clear(done.folder)
     monkeypatch.undo()
-    assert kept.read_row(one.folder) is None
+    assert kept.read_row(done.folder) is None
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", '{"files": []}', "\x00" * 100])
-def test_a_damaged_row_is_none(one: task.Task, text: str) -> None:
-    task.work(one)
-    (one.folder / "row.json").write_text(text, encoding="utf-8")
-    assert kept.read_row(one.folder) is None
-    assert task.work(one).status == "done"
+def test_a_damaged_row_is_none(done: task.Task, again: list[steps.Job], text: str) -> None:
+    (done.folder / "row.json").write_text(text, encoding="utf-8")
+    assert kept.read_row(done.folder) is None
+    assert task.work(done).status == "done"
+    assert len(again) == 1
 
 
 @pytest.mark.parametrize(
     "altered", [{"seconds": None}, {"files": None}, {"start_ns": "x"}, {"evaluate": 5}, {"more": 1}]
 )
-def test_an_altered_row_is_none(one: task.Task, altered: dict[str, Any]) -> None:
-    task.work(one)
-    path = one.folder / "row.json"
-    whole = kept.read_row(one.folder)
+def test_an_altered_row_is_none(done: task.Task, again: list[steps.Job], altered: dict[str, Any]) -> None:
+    path = done.folder / "row.json"
+    whole = kept.read_row(done.folder)
     assert whole is not None
     path.write_text(json.dumps({**json.loads(path.read_text("utf-8")), **altered}), encoding="utf-8")
-    assert kept.read_row(one.folder) is None
-    assert task.work(one).status == "done"
+    assert kept.read_row(done.folder) is None
+    assert task.work(done).status == "done"
+    assert len(again) == 1
 
 
 def rewritten(folder: Path, changes: dict[str, Any]) -> None:
@@ -530,22 +611,21 @@ def rewritten(folder: Path, changes: dict[str, Any]) -> None:
 @pytest.mark.parametrize(
     "changes", [{"evaluate": {"mse": 1}}, {"files": None}, {"more": 1}, {"seconds": {"read": "1"}}]
 )
-def test_a_row_of_another_form_is_none(one: task.Task, changes: dict[str, Any]) -> None:
-    task.work(one)
-    rewritten(one.folder, changes)
-    assert kept.read_row(one.folder) is None
-    assert task.work(one).status == "done"
+def test_a_row_of_another_form_is_none(done: task.Task, again: list[steps.Job], changes: dict[str, Any]) -> None:
+    rewritten(done.folder, changes)
+    assert kept.read_row(done.folder) is None
+    assert task.work(done).status == "done"
+    assert len(again) == 1
 
 
-def test_a_row_that_does_not_tell_what_was_lost_stands(one: task.Task) -> None:
-    row = task.work(one)
-    rewritten(one.folder, {"lost": None})
-    assert kept.read_row(one.folder) == replace(row, lost=None)
-    assert task.work(one) == replace(row, lost=None)
+def test_a_row_that_does_not_tell_what_was_lost_stands(done: task.Task, carried_out: LogResult) -> None:
+    rewritten(done.folder, {"lost": None})
+    assert kept.read_row(done.folder) == replace(carried_out, lost=None)
+    assert task.work(done) == replace(carried_out, lost=None)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems take no such name")
-@pytest.mark.usefixtures("undrawn")
+@pytest.mark.usefixtures("elsewhere")
 def test_a_name_of_bytes_that_are_no_characters(tmp_path: Path) -> None:
     logs = archive(tmp_path, 1)
     recipe(tmp_path, 'steps = ["fit", "evaluate", "diagnose"]\n[fit]\ndraws = 20\nestimator = "derivative"\n')
@@ -589,6 +669,7 @@ def test_time_left_by_bytes_and_by_count() -> None:
     assert [told_time(s) for s in (5.0, 600.0, 10_000.0)] == ["5 s", "10 min", "2.8 h"]
 
 
+@pytest.mark.usefixtures("elsewhere")
 def test_progress_names_what_is_at_work(tmp_path: Path) -> None:
     logs = archive(tmp_path, 3)
     recipe(tmp_path)

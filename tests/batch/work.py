@@ -7,6 +7,13 @@ import signal
 import sys
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ferryid.batch.log_result import LogResult
+    from ferryid.batch.task import Task
+
+# Every process that is started imports this, and little beside it.
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -34,6 +41,26 @@ def square(item: tuple[str, int, str]) -> tuple[int, int]:
         raise KeyError(f"number {number}")
     time.sleep(60.0 if fate == "sleeps" else 0.05)
     return number**2, os.getpid()
+
+
+def blank(one: Task) -> LogResult:
+    """Carry out a task of a batch, and leave figures blank, as tests do that look at none."""
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    from ferryid.batch import task
+    from tests.conftest import BLANK
+
+    FigureCanvasSVG.print_svg = lambda canvas, file, **options: file.write(BLANK)  # type: ignore[method-assign]
+    return task.work(one)
+
+
+def deadly(one: Task) -> LogResult:
+    """Carry out a task of a batch, but die at once at a log of that name."""
+    from ferryid.batch import task
+
+    if "deadly" in one.name:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return task.work(one)
 
 
 def calls(folder: Path, number: int) -> int:
