@@ -31,3 +31,11 @@ def ferryid(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
 def fixtures() -> Path:
     """Folder of the small logs."""
     return FIXTURES
+
+
+@pytest.fixture
+def batch_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let a batch work in this process, which has loaded everything; what it does in others is tested in tests/batch."""
+    from ferryid.batch import run, spread
+
+    monkeypatch.setattr(run, "spread", lambda processes, dask, *, apart: spread.spread())

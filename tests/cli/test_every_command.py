@@ -14,11 +14,13 @@ import pytest
 
 import ferryid.cli
 from ferryid.regression.bases.forms import basis_names
+from tests.command_line.in_process import Run, invoke
 from tests.report.pages import needs_nothing
 
 pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).resolve().parents[2]
+FIXTURES = ROOT / "fixtures"
 COMMANDS = sorted(
     module.name.removeprefix("cmd_")
     for module in pkgutil.iter_modules(ferryid.cli.__path__)
@@ -86,16 +88,29 @@ def test_inspect(ferryid, fixtures: Path, log: str, vessel: tuple[str, ...]) -> 
     assert conforms(run.out)["messages"] > 0
 
 
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Run]:
+    """Return an output folder with the models milliampere@1 and @2, and what the fit of the first printed."""
+    out = tmp_path_factory.mktemp("fitted") / "out"
+    words = ("fit", FIXTURES / "short.mcap", "--vessel", "milliampere", *SCALE, *THESIS, "--out", out)
+    first = invoke(*words, "--json", "-")
+    assert invoke(*words, "--basis", "thesis", "--structure", "coupled", "--no-report").code == 0
+    return out, first
+
+
+@pytest.fixture(scope="module")
+def compared(fitted: tuple[Path, Run]) -> Run:
+    """Return what the comparison of the two printed."""
+    logs = ("--on", FIXTURES / "short.mcap", FIXTURES / "short.bag")
+    return invoke("compare", "milliampere@1", "milliampere@2", *logs, "--out", fitted[0], "--json", "-")
+
+
 @pytest.mark.draws
-def test_ingest_fit_evaluate_compare_and_models(ferryid, fixtures: Path, tmp_path: Path) -> None:
-    log, other, out = fixtures / "short.mcap", fixtures / "short.bag", tmp_path / "out"
+def test_ingest_fit_evaluate_compare_and_models(
+    ferryid, fixtures: Path, fitted: tuple[Path, Run], compared: Run
+) -> None:
+    log, other, (out, run) = fixtures / "short.mcap", fixtures / "short.bag", fitted
 
-    run = ferryid("ingest", log, "--vessel", "milliampere", "--out", out, "--json", "-")
-    tables = conforms(run.out)["logs"][0]
-    assert {table["topic"] for table in tables["tables"]} >= {"/navigation/odometry", "/thruster1/state"}
-    assert len(list(Path(tables["folder"]).glob("*.parquet"))) == len(tables["tables"])
-
-    run = ferryid("fit", log, "--vessel", "milliampere", *SCALE, *THESIS, "--out", out, "--json", "-")
     fit = conforms(run.out)
     assert run.code == 0
     assert fit["model"]["accepted"], fit["reasons"]
@@ -105,28 +120,16 @@ def test_ingest_fit_evaluate_compare_and_models(ferryid, fixtures: Path, tmp_pat
     conforms(Path(fit["model"]["path"]).read_text(encoding="utf-8"))
     conforms((Path(fit["report"]).parent / "fit.json").read_text(encoding="utf-8"))
 
-    run = ferryid(
-        "fit",
-        log,
-        "--vessel",
-        "milliampere",
-        *SCALE,
-        *THESIS,
-        "--basis",
-        "thesis",
-        "--structure",
-        "coupled",
-        "--out",
-        out,
-    )
-    assert run.code == 0
+    run = ferryid("ingest", log, "--vessel", "milliampere", "--out", out, "--json", "-")
+    tables = conforms(run.out)["logs"][0]
+    assert {table["topic"] for table in tables["tables"]} >= {"/navigation/odometry", "/thruster1/state"}
+    assert len(list(Path(tables["folder"]).glob("*.parquet"))) == len(tables["tables"])
 
     evaluation = conforms(ferryid("evaluate", "milliampere@1", other, "--out", out, "--json", "-").out)
     assert evaluation["logs"][0]["normalised_mse"] < 1.0
     assert evaluation["logs"][0]["per_axis"] == evaluation["pooled"]["per_axis"]
 
-    run = ferryid("compare", "milliampere@1", "milliampere@2", "--on", log, other, "--out", out, "--json", "-")
-    comparison = conforms(run.out)
+    comparison = conforms(compared.out)
     assert [model["label"] for model in comparison["models"]] == ["base model", "milliampere@1", "milliampere@2"]
     assert [entry["scores"]["milliampere@2"]["trained"] for entry in comparison["logs"]] == [True, False]
     assert evaluation["pooled"]["mse"]["model"]["sway"] == pytest.approx(
@@ -139,13 +142,6 @@ def test_ingest_fit_evaluate_compare_and_models(ferryid, fixtures: Path, tmp_pat
     assert page.count("<svg") == 2 + 2
     assert needs_nothing(page)
     conforms((Path(comparison["report"]).parent / "compare.json").read_text(encoding="utf-8"))
-    again = ferryid(
-        "compare", "milliampere@1", "milliampere@2", "--on", log, "--on", other, "--out", out, "--json", "-"
-    )
-    assert conforms(again.out) == comparison
-    text = ferryid("compare", "milliampere@1", "milliampere@2", f"--on={log}", other, "--out", out).out
-    assert f"report  {comparison['report']}" in text
-    assert "warning: milliampere@1 was trained on this log: its scores here are no evidence" in text
     alone = conforms(ferryid("compare", "milliampere@1", "milliampere@2", "--out", out, "--json", "-").out)
     assert alone["logs"] == []
     assert alone["coefficients"] == comparison["coefficients"]
@@ -154,6 +150,23 @@ def test_ingest_fit_evaluate_compare_and_models(ferryid, fixtures: Path, tmp_pat
     assert [model["version"] for model in models] == [1, 2]
     assert sum(model["current"] for model in models) == 1
     conforms(ferryid("models", "milliampere@1", "--out", out, "--json", "-").out)
+
+
+def test_the_logs_of_a_comparison_are_given_in_several_ways(
+    ferryid, fixtures: Path, fitted: tuple[Path, Run], compared: Run, tmp_path: Path
+) -> None:
+    log, other, (out, _) = fixtures / "short.mcap", fixtures / "short.bag", fitted
+    models, comparison = ("compare", "milliampere@1", "milliampere@2"), conforms(compared.out)
+    again = ferryid(*models, "--on", log, "--on", other, "--out", out, "--json", tmp_path / "again.json")
+    assert conforms((tmp_path / "again.json").read_text(encoding="utf-8")) == comparison
+    # A log of eighteen seconds, as the logs are what is looked at.
+    cut = fixtures / "truncated.mcap"
+    text = ferryid(*models, f"--on={log}", cut, "--out", out, "--json", tmp_path / "cut.json").out
+    told = conforms((tmp_path / "cut.json").read_text(encoding="utf-8"))
+    assert [entry["name"] for entry in told["logs"]] == ["short", "truncated"]
+    for printed, report in ((again.out, comparison["report"]), (text, told["report"])):
+        assert f"report  {report}" in printed
+        assert "warning: milliampere@1 was trained on this log: its scores here are no evidence" in printed
 
 
 @pytest.mark.draws
@@ -195,8 +208,8 @@ def test_sweep_structures(ferryid, fixtures: Path, tmp_path: Path) -> None:
 
 def test_fit_takes_the_window_that_it_is_told_to_choose(ferryid, fixtures: Path, tmp_path: Path) -> None:
     run = ferryid(
-        "fit", fixtures / "short.mcap", "--vessel", "milliampere", *SCALE, "--window", "auto", "--out", tmp_path,
-        "--json", tmp_path / "fit.json",
+        "fit", fixtures / "short.mcap", "--vessel", "milliampere", *SCALE, "--window", "auto", "--no-report",
+        "--out", tmp_path, "--json", tmp_path / "fit.json",
     )  # fmt: skip
     assert run.code == 0, run.err
     settings = conforms((tmp_path / "fit.json").read_text(encoding="utf-8"))["settings"]
@@ -232,6 +245,7 @@ def test_diagnose_one_log_and_two(ferryid, fixtures: Path, tmp_path: Path) -> No
     assert found.err.startswith("vessel milliampere: bundled, the only profile")
 
 
+@pytest.mark.usefixtures("batch_here")
 def test_batch(ferryid, fixtures: Path, tmp_path: Path) -> None:
     options = ("--vessel", "milliampere", "--out", tmp_path / "out", "--json", "-")
     run = ferryid("batch", fixtures / "sh*.mcap", fixtures / "truncated.bag", fixtures / "README.md", *options)
@@ -261,6 +275,7 @@ def test_two_fits_of_one_log_are_the_same_file(ferryid, fixtures: Path, tmp_path
             "milliampere",
             *SCALE,
             *THESIS,
+            "--no-report",
             "--out",
             tmp_path / name,
             "--json",
@@ -290,13 +305,25 @@ def test_simulate_and_list(ferryid, tmp_path: Path) -> None:
 
 def test_reproduce_one_study(ferryid, tmp_path: Path) -> None:
     run = ferryid(
-        "reproduce", "thesis", "--only", "calm", "--seeds", "1", "--processes", "1", "--out", tmp_path, "--json", "-"
+        "reproduce",
+        "thesis",
+        "--only",
+        "guidance",
+        "--seeds",
+        "1",
+        "--processes",
+        "1",
+        "--out",
+        tmp_path,
+        "--json",
+        "-",
     )
     assert run.code == 0, run.err
     result = conforms(run.out)
     page = (tmp_path / "thesis.md").read_text(encoding="utf-8")
-    assert [study["name"] for study in result["studies"]] == ["calm"]
+    assert [study["name"] for study in result["studies"]] == ["guidance"]
     shown = re.findall(r"\(thesis/([^)]+[.]svg)\)", page)
+    assert shown
     assert shown == [figure["file"] for figure in result["studies"][0]["figures"]]
     assert sorted(shown) == sorted(path.name for path in (tmp_path / "thesis").iterdir())
     refused = ferryid("reproduce", "thesis", "--only", "clam", "--out", tmp_path)
@@ -325,7 +352,7 @@ def test_require_accept_exits_with_3(ferryid, tmp_path: Path) -> None:
     # Where nothing but noise comes on top of it, the true model cannot be improved by 5 %.
     log = tmp_path / "calm.mcap"
     assert ferryid("simulate", "twelve-corner-calm", "--log", log).code == 0
-    run = ferryid("fit", log, "--vessel", "milliampere", "--out", tmp_path, "--require-accept")
+    run = ferryid("fit", log, "--vessel", "milliampere", "--out", tmp_path, "--require-accept", "--no-report")
     assert run.code == 3
     assert "Not accepted" in run.out
     assert "rejected" in ferryid("models", "--out", tmp_path).out
