@@ -15,9 +15,12 @@ import scipy.io
 from ferryid.ingest import open_log
 from ferryid.ingest.log import Series
 from ferryid.vessel import load_profile, select
+from tests.cli.conftest import FIXTURES
+from tests.command_line.in_process import invoke
 from tests.ingest.autopilot_logs import DataFlash, ulog
 
-SCALE = ("--delta", "0.4", "--sigma", "0.4", "--accept", "thesis")
+SCALE = ("--delta", "0.4", "--sigma", "0.4", "--accept", "thesis", "--no-report")
+MCAP = (FIXTURES / "short.mcap", "--vessel", "milliampere")
 FORMATS = ["mat", "7.3.mat", "ulg", "bin"]
 
 
@@ -110,32 +113,47 @@ def coefficients(run: Any) -> np.ndarray:
     return np.array([entry["value"] for axis in model["coefficients"].values() for entry in axis.values()])
 
 
+@pytest.fixture(scope="module")
+def theirs(tmp_path_factory: pytest.TempPathFactory) -> np.ndarray:
+    """Coefficients of a fit to the MCAP."""
+    return coefficients(invoke("fit", *MCAP, *SCALE, "--out", tmp_path_factory.mktemp("theirs"), "--json", "-"))
+
+
+@pytest.fixture(scope="module")
+def of_their_archive(tmp_path_factory: pytest.TempPathFactory) -> np.ndarray:
+    """Coefficients of a fit to an archive of the MCAP."""
+    archive = ("--out", tmp_path_factory.mktemp("archive"), "--json", "-")
+    assert invoke("ingest", *MCAP, *archive).code == 0
+    return coefficients(invoke("fit", *MCAP, *SCALE, "--archive", *archive))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", FORMATS)
-def test_a_fit_finds_the_same_coefficients(ferryid: Any, fixtures: Path, tmp_path: Path, kind: str) -> None:
+def test_a_fit_finds_the_same_coefficients(
+    ferryid: Any, fixtures: Path, tmp_path: Path, theirs: np.ndarray, kind: str
+) -> None:
     log, _ = written_as(kind, fixtures / "short.mcap", tmp_path / kind)
-    options = (*SCALE, "--out", tmp_path / "out", "--json", "-")
-    theirs = coefficients(ferryid("fit", fixtures / "short.mcap", "--vessel", "milliampere", *options))
     # The profile beside the log is found.
-    ours = coefficients(ferryid("fit", log, *options))
+    ours = coefficients(ferryid("fit", log, *SCALE, "--out", tmp_path / "out", "--json", "-"))
     # Autopilots count in microseconds, and what is in nanoseconds in the MCAP is rounded.
     np.testing.assert_allclose(ours, theirs, rtol=1e-9 if kind.endswith("mat") else 1e-4, atol=1e-6)
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("batch_here")
 @pytest.mark.parametrize("kind", FORMATS)
-def test_ranges_archive_and_batch_take_them(ferryid: Any, fixtures: Path, tmp_path: Path, kind: str) -> None:
+def test_ranges_archive_and_batch_take_them(
+    ferryid: Any, fixtures: Path, tmp_path: Path, of_their_archive: np.ndarray, kind: str
+) -> None:
     log, _ = written_as(kind, fixtures / "short.mcap", tmp_path / kind)
     out = ("--out", tmp_path / "out", "--json", "-")
     run = ferryid("fit", log, *SCALE, "--from", "10", "--to", "80", *out)
     assert run.code == 0, run.err
     assert json.loads(run.out)["logs"][0]["duration_s"] == pytest.approx(70.0, abs=0.3)
-    found = []
-    for one, more in ((log, ()), (fixtures / "short.mcap", ("--vessel", "milliampere"))):
-        archive = (*more, "--out", tmp_path / f"out of {one.suffix}", "--json", "-")
-        assert ferryid("ingest", one, *archive).code == 0
-        found.append(coefficients(ferryid("fit", one, *SCALE, "--archive", *archive)))
-    np.testing.assert_allclose(found[0], found[1], rtol=1e-3, atol=1e-4)
+    archive = ("--out", tmp_path / f"out of {log.suffix}", "--json", "-")
+    assert ferryid("ingest", log, *archive).code == 0
+    ours = coefficients(ferryid("fit", log, *SCALE, "--archive", *archive))
+    np.testing.assert_allclose(ours, of_their_archive, rtol=1e-3, atol=1e-4)
     (tmp_path / "recipe.toml").write_text('steps = ["evaluate"]\n', encoding="utf-8")
     run = ferryid("batch", f"{tmp_path / kind}/short.*", "--recipe", tmp_path / "recipe.toml", "--processes", "1", *out)
     (row,) = json.loads(run.out)["rows"]

@@ -153,6 +153,7 @@ def test_diagnosis_against_a_simulation(ferryid: Command, place: Path) -> None:
     assert counted(run.out)
 
 
+@pytest.mark.usefixtures("batch_here")
 def test_batch(ferryid: Command, place: Path) -> None:
     recipe = place / "recipe.toml"
     recipe.write_text('steps = ["fit"]\n\n[fit]\ncomponents = 3\nreport = false\n', encoding="utf-8")
@@ -176,7 +177,7 @@ def test_a_stray_time_is_counted_on_the_terminal_of_a_fit(ferryid: Command, plac
             stream = replace(stream, stamp_ns=stamp)
         streams.append(stream)
     log = written(replace(made, streams=tuple(streams)), place / "stray.mcap")
-    run = ferryid("fit", log, *VESSEL, "--components", "1", "--out", place / "stray")
+    run = ferryid("fit", log, *VESSEL, "--components", "1", "--no-report", "--out", place / "stray")
     assert run.code == 0, run.err
     assert "2 of 12000 rows had a senseless stamp and are put at their receive time" in run.out
     assert "are left out" not in run.out
