@@ -93,8 +93,9 @@ def test_speeds_in_rad_per_second_declared_as_rpm_are_told_and_not_accepted(ferr
         table[f"thruster{number} speed [rpm]"] /= 9.55
     log = write(table, tmp_path / "slow.csv")
     run = ferryid(
-        "fit", log, "--vessel", profile(tmp_path), "--components", "8", "--out", tmp_path / "out", "--json", "-"
-    )
+        "fit", log, "--vessel", profile(tmp_path), "--components", "8", "--no-report", "--out", tmp_path / "out",
+        "--json", "-",
+    )  # fmt: skip
     assert run.code == 0, run.err
     result = conforms(run.out)
     assert not result["model"]["accepted"]
@@ -109,8 +110,9 @@ def test_speeds_in_rad_per_second_declared_as_rpm_are_told_and_not_accepted(ferr
 def test_velocities_over_ground_in_a_current_come_with_a_warning(ferryid, tmp_path: Path) -> None:
     log = write(corners(CURRENT), tmp_path / "tide.csv")
     run = ferryid(
-        "fit", log, "--vessel", profile(tmp_path), "--components", "8", "--out", tmp_path / "out", "--json", "-"
-    )
+        "fit", log, "--vessel", profile(tmp_path), "--components", "8", "--no-report", "--out", tmp_path / "out",
+        "--json", "-",
+    )  # fmt: skip
     assert run.code == 0, run.err
     result = conforms(run.out)
     assert result["excitation"]["heading_coverage"] < 0.5
@@ -152,7 +154,7 @@ def test_an_axis_without_excitation_keeps_the_coefficients_of_the_base_model(
     ferryid, tmp_path: Path, estimator: str
 ) -> None:
     log = write(straight(), tmp_path / "straight.csv")
-    options = ("--estimator", estimator, "--components", "18", "--out", tmp_path / "out", "--json", "-")
+    options = ("--estimator", estimator, "--components", "18", "--no-report", "--out", tmp_path / "out", "--json", "-")
     run = ferryid("fit", log, "--vessel", profile(tmp_path), *options)
     assert run.code == 0, run.err
     result = conforms(run.out)
@@ -182,7 +184,8 @@ def test_ten_logs_of_twenty_seconds_are_fitted_as_one_and_are_too_little_to_acce
         rows = slice(450 * number, 450 * number + 200)
         logs.append(write({name: values[rows] for name, values in whole.items()}, tmp_path / f"part{number}.csv"))
     out = tmp_path / "out"
-    run = ferryid("fit", *logs, "--vessel", profile(tmp_path), "--components", "4", "--out", out, "--json", "-")
+    options = ("--components", "4", "--no-report", "--out", out, "--json", "-")
+    run = ferryid("fit", *logs, "--vessel", profile(tmp_path), *options)
     assert run.code == 0, run.err
     result = conforms(run.out)
     assert [one["name"] for one in result["logs"]] == [f"part{number}" for number in range(10)]

@@ -25,7 +25,7 @@ def test_every_command_that_takes_logs_has_them(ferryid, command: str) -> None:
 @pytest.mark.slow
 def test_a_model_keeps_the_ranges_it_was_fitted_to(ferryid, fixtures: Path, tmp_path: Path) -> None:
     log, out = fixtures / "short.mcap", tmp_path / "out"
-    run = ferryid("fit", log, *BOAT, *SCALE, "--to", "60", "--out", out, "--json", "-")
+    run = ferryid("fit", log, *BOAT, *SCALE, "--to", "60", "--no-report", "--out", out, "--json", "-")
     assert run.code == 0, run.err
     fit = json.loads(run.out)
     assert fit["logs"][0]["duration_s"] == pytest.approx(60.0, abs=0.2)
@@ -37,6 +37,7 @@ def test_a_model_keeps_the_ranges_it_was_fitted_to(ferryid, fixtures: Path, tmp_
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("batch_here")
 def test_a_batch_with_another_range_is_done_again(ferryid, fixtures: Path, tmp_path: Path) -> None:
     log = shutil.copy(fixtures / "short.mcap", tmp_path / "a.mcap")
     (tmp_path / "recipe.toml").write_text('steps = ["evaluate"]\n', encoding="utf-8")
