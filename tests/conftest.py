@@ -41,6 +41,7 @@ def nobody_waits_for_the_disk() -> Iterator[None]:
         yield
 
 
+# But for tests that are marked as blank.
 DRAWN = ("tests/report/", "tests/reproduce/", "tests/proof/", "tests/real/")
 NOT_DRAWN = "not drawn: see tests/conftest.py"
 BLANK = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"><title>{NOT_DRAWN}</title></svg>\n'
@@ -82,6 +83,8 @@ def pytest_runtest_setup(item: Any) -> None:
 
 def _draws(item: Any) -> bool:
     """Tell whether a test needs figures as they are."""
+    if item.get_closest_marker("blank") is not None:
+        return False
     return (
         item.get_closest_marker("draws") is not None
         or item.nodeid.startswith(DRAWN)

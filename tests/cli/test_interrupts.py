@@ -19,18 +19,21 @@ BUSY = """
 import subprocess, sys, time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-import numba, numpy as np
 from ferryid.files import replacing, scratch_folder
 import ferryid.signals.inspect as module
 
 out = Path(sys.argv[1])
 
-@numba.njit(nogil=True)
-def compiled(n):
-    x = 0.0
-    for i in range(n):
-        x = np.sin(x + i)
-    return x
+# Loading numba takes longer than all else, and only what is compiled needs it.
+if {compiles}:
+    import numba, numpy as np
+
+    @numba.njit(nogil=True)
+    def compiled(n):
+        x = 0.0
+        for i in range(n):
+            x = np.sin(x + i)
+        return x
 
 def pool():
     with ThreadPoolExecutor(2) as pool:

@@ -14,12 +14,11 @@ from tests.cli.test_diagnose_input import refused
 from tests.cli.test_every_command import conforms
 from tests.command_line.in_process import Run
 
-pytestmark = pytest.mark.draws
-
 Command = Callable[..., Run]
 
 
 @pytest.mark.slow
+@pytest.mark.draws
 def test_a_path_for_a_vessel_that_pushes_every_way(ferryid: Command, tmp_path: Path) -> None:
     words = (
         "plan",
@@ -52,8 +51,9 @@ def test_a_path_for_a_vessel_that_pushes_every_way(ferryid: Command, tmp_path: P
 
 
 @pytest.mark.slow
+@pytest.mark.draws
 def test_orders_for_a_vessel_that_steers(ferryid: Command, tmp_path: Path) -> None:
-    run = ferryid("plan", "--vessel", "vtec-usv", "--minutes", "3", "--out", tmp_path, "--json", "-")
+    run = ferryid("plan", "--vessel", "vtec-usv", "--minutes", "2", "--out", tmp_path, "--json", "-")
     assert run.code == 0, run.err
     found = conforms(run.out)
     assert found["path"] is None
@@ -63,7 +63,7 @@ def test_orders_for_a_vessel_that_steers(ferryid: Command, tmp_path: Path) -> No
     assert found["generic_hull"]
     assert not list((tmp_path / "plans" / "vtec-usv").glob("*.toml"))
     refused(
-        ferryid("plan", "--vessel", "vtec-usv", "--area", "2x1", "--out", tmp_path / "b"),
+        ferryid("plan", "--vessel", "vtec-usv", "--minutes", "2", "--area", "2x1", "--out", tmp_path / "b"),
         "--area: 2x1 m has no room for any manoeuvre of vtec-usv",
     )
 

@@ -11,6 +11,8 @@ import pytest
 
 from ferryid import api
 from ferryid.batch.changes import GroupTask, compare_groups_of
+from ferryid.diagnose import Versus
+from ferryid.report import versus_report
 from ferryid.report.batch_rows import Change
 from ferryid.simulate import parse_scenario, simulate, write_log
 from ferryid.vessel import load_profile
@@ -34,7 +36,9 @@ Command = Callable[..., Run]
 
 
 @pytest.mark.slow
-def test_two_groups_and_several_logs_after_one_option(ferryid: Command, tmp_path: Path) -> None:
+def test_two_groups_and_several_logs_after_one_option(
+    ferryid: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     logs = []
     for seed, effects in enumerate(("", "", WEAK, WEAK), 1):
         scenario = parse_scenario(SCENARIO.format(effects=effects), f"bag{seed}")
@@ -56,17 +60,30 @@ def test_two_groups_and_several_logs_after_one_option(ferryid: Command, tmp_path
     assert "<svg" in page
     assert weak["says"] in page
     # The typed call leaves the same.
+    compare, asked, answers = versus_report.compare_groups, [], []
+
+    def compared(*of: object) -> Versus:
+        asked.append(of)
+        answers.append(compare(*of) if not answers else answers[0])
+        return answers[0]
+
+    monkeypatch.setattr(versus_report, "compare_groups", compared)
     again = api.compare_groups(logs[:2], logs[2:], "milliampere", tmp_path / "api")
     assert {**again.json, "report": ""} == {**json.loads(run.out), "report": ""}
     assert weak["says"] in again.text
     assert again.tables["differences"].query("confirmed")["value"].tolist() == [weak["parameters"]["factor"]["value"]]
-    # So does a batch of them, whose ingested tables are there.
+    # So does a batch of them, which asks the same of the tables that are there: it is answered without doing it once more.
     profile = load_profile("milliampere")
     change = Change(profile.name, ("bag1", "bag2"), ("bag3", "bag4"), "the last 2 logs against the first 2")
     paths = [tuple(map(str, one)) for one in (logs[:2], logs[2:])]
     folder = tmp_path / "api" / "batch" / "changes" / "x"
     task = GroupTask(*paths, change, folder, tmp_path / "api", profile.text, profile.path, None, (), (), 4 << 30)
     done = compare_groups_of(task)
+    (*of_call, call), (*of_batch, batch) = asked
+    assert [list(map(str, group)) for group in of_call[:2]] == [list(map(str, group)) for group in of_batch[:2]]
+    assert of_call[2].sha256 == of_batch[2].sha256
+    assert of_call[3] == of_batch[3]
+    assert (batch.tables, batch.ranges) == (call.tables, call.ranges)
     assert (done.verdict, done.summary) == (found["verdict"], found["summary"])
     assert weak["says"] in done.differences
     assert (tmp_path / "api" / "batch" / str(done.report)).is_file()

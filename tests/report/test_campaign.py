@@ -46,6 +46,7 @@ def test_what_all_logs_share_stands_once(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.blank
 def test_what_has_a_figure_stays_with_its_log(tmp_path: Path) -> None:
     made = report(campaign(), tmp_path)
     assert made.report.read_text(encoding="utf-8").count(wind().says) == 2
@@ -54,6 +55,7 @@ def test_what_has_a_figure_stays_with_its_log(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.blank
 def test_the_model_of_all_logs_stands_once(tmp_path: Path) -> None:
     several = [replace(one, model=str(tmp_path / "models" / "ferry" / "3.json")) for one in campaign()]
     text = " ".join(as_text(several).split())
@@ -64,6 +66,7 @@ def test_the_model_of_all_logs_stands_once(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.blank
 def test_which_logs_take_part_stands_before_all_logs(tmp_path: Path) -> None:
     split, rest = "No common hull fits a on one side and b on the other.", "Current of each log: not confirmed."
     several = [replace(one, notes=(split, rest), gathered=(split,)) for one in campaign()]

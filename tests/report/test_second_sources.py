@@ -45,6 +45,7 @@ SPIKES = "psi: 51 of 17701 samples were interpolated the wrong way round; remove
 
 
 @pytest.mark.slow
+@pytest.mark.blank
 def test_the_page_lists_instruments_and_repairs() -> None:
     page, _ = render((replace(diagnosis("explained"), sources=FOUND, repairs=(SPIKES,)),), "trial")
     for shown in ("Other instruments in the log", PLACE.says, "/nav/pose x, y", "0.069 m", WITNESS.says, SPIKES):
@@ -70,6 +71,7 @@ def test_a_terminal_has_one_line_for_each_sender_and_kind() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.blank
 def test_of_a_campaign_instruments_stand_once(tmp_path: Path) -> None:
     pair = tuple(replace(diagnosis("explained"), log=name, sources=FOUND) for name in ("one", "two"))
     assert render(pair, "trial")[0].count("Other instruments in the log") == 1
@@ -81,6 +83,7 @@ def test_of_a_campaign_instruments_stand_once(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.blank
 def test_json_has_instruments_and_repairs(tmp_path: Path) -> None:
     plain = report((replace(diagnosis("explained"), sources=FOUND, repairs=(SPIKES,)),), tmp_path).json
     conforms(plain)
