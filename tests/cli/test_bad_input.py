@@ -100,7 +100,7 @@ def test_a_recording_and_its_copy_in_another_format_in_one_folder(
 @pytest.mark.slow
 def test_a_thruster_known_by_its_orders_alone_is_said_on_the_terminal(ferryid, fixtures: Path, tmp_path: Path) -> None:
     profile = profile_with(tmp_path, 'topic = "/thruster1/state"', 'topic = "/thruster1/stat"')
-    run = ferryid("fit", fixtures / "short.mcap", "--vessel", profile, "--out", tmp_path / "out")
+    run = ferryid("fit", fixtures / "short.mcap", "--vessel", profile, "--no-report", "--out", tmp_path / "out")
     assert run.code == 0, run.err
     assert "thruster1.speed: the order is used" in run.out
     again = ferryid("evaluate", "milliampere", fixtures / "short.mcap", "--vessel", profile, "--out", tmp_path / "out")
@@ -315,7 +315,7 @@ def test_the_same_log_twice(ferryid, fixtures: Path, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_model_of_another_vessel(ferryid, fixtures: Path, tmp_path: Path) -> None:
-    run = ferryid("fit", fixtures / "short.mcap", "--vessel", "milliampere", "--out", tmp_path)
+    run = ferryid("fit", fixtures / "short.mcap", "--vessel", "milliampere", "--no-report", "--out", tmp_path)
     assert run.code == 0
     refused(
         ferryid("evaluate", "milliampere", fixtures / "short.csv", "--vessel", "esso-osaka", "--out", tmp_path),
@@ -354,7 +354,7 @@ def test_wrong_use_is_told_shortly(ferryid, arguments: tuple[str, ...]) -> None:
 def test_comparisons_that_mean_nothing(ferryid, fixtures: Path, tmp_path: Path) -> None:
     log, out = fixtures / "short.mcap", ("--out", tmp_path)
     for components in ("6", "9"):
-        assert ferryid("fit", log, "--vessel", "milliampere", "--components", components, *out).code == 0
+        assert ferryid("fit", log, "--vessel", "milliampere", "--components", components, "--no-report", *out).code == 0
     pair = ("compare", "milliampere@1", "milliampere@2")
     refused(ferryid("compare", "milliampere@1", "milliampere@1", *out), "milliampere@1", "the same model")
     refused(ferryid("compare", "milliampere@1", "--on", log, *out), "two or more models")
