@@ -128,6 +128,8 @@ def test_ingest_fit_evaluate_compare_and_models(
     evaluation = conforms(ferryid("evaluate", "milliampere@1", other, "--out", out, "--json", "-").out)
     assert evaluation["logs"][0]["normalised_mse"] < 1.0
     assert evaluation["logs"][0]["per_axis"] == evaluation["pooled"]["per_axis"]
+    runs = evaluation["logs"][0]["free_run"]
+    assert runs["model"]["position_m"][0] < runs["base"]["position_m"][0]
 
     comparison = conforms(compared.out)
     assert [model["label"] for model in comparison["models"]] == ["base model", "milliampere@1", "milliampere@2"]

@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from ferryid.compare import evaluate
+from ferryid.files import dump_json
+from ferryid.models import Model, blank_model
 from ferryid.models.scores import force_scores
 from ferryid.report.evaluation_text import render_evaluation
+from ferryid.types import RunContext
+from ferryid.vessel import load_profile
+
+LOG = Path(__file__).resolve().parents[2] / "fixtures" / "short.mcap"
 
 N = 400
 HEAD = {"model": {"name": "ferry", "version": 1}, "window_s": 2.0}
@@ -36,3 +45,17 @@ def test_the_verdict_says_where_a_model_is_worse(ratios: tuple[float, float, flo
     scores = force_scores(tau, base, model, np.ones(N, dtype=bool))
     text = render_evaluation({**HEAD, "logs": [{"name": "log", **scores.to_json()}]})
     assert f"  {told}" in text.splitlines()
+
+
+@pytest.mark.slow
+def test_a_model_that_adds_nothing_needs_no_second_free_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Evaluated as its base model alone, and as other models are: the same to the last digit."""
+    profile = load_profile("milliampere")
+    context = RunContext(tmp_path, ranges=((0.0, 20.0),))
+
+    def told() -> str:
+        return dump_json(evaluate(blank_model(profile, "bare"), [str(LOG)], context, profile=profile))
+
+    once = told()
+    monkeypatch.setattr(Model, "blank", False)
+    assert told() == once
