@@ -140,14 +140,14 @@ def feasible_gains(
     wanted, pull = problem.tied(problem.flat(gains), ties)
     cuts: list[tuple[Floats, float, str]] = []
     symmetry = problem.symmetry()
-    points = _points(nu)
+    damping = problem.damping(_points(nu))
     current = wanted
     active = np.zeros(0, dtype=np.int64)
     rows: list[tuple[Floats, float, str]] = []
     for _ in range(_ROUNDS):
         mass = problem.mass(current)
         cuts += problem.mass_cuts(mass)
-        rows = symmetry + cuts + problem.dissipation(current, points)
+        rows = symmetry + cuts + problem.dissipation(current, damping)
         found, active = _nearest(
             problem.cost, wanted, np.array([row[0] for row in rows]), np.array([row[1] for row in rows])
         )
@@ -162,6 +162,15 @@ def feasible_gains(
     contradicted = bool(bounds) and float(shift @ problem.cost @ shift) > chdtri(len(bounds), IDENTIFY.bound_level)
     told = tuple(dict.fromkeys(bounds)) if contradicted else ()
     return Feasible(problem.gains(current), told, (lift, normal, level), shift, tuple(problem.places), pull)
+
+
+@dataclass(frozen=True, eq=False)
+class _Damping:
+    """Velocities, shape (p, 3), the functions of each gain there, (p, size), and what the base model takes, (p,) [W]."""
+
+    points: Floats
+    functions: Floats
+    levels: Floats
 
 
 class _Problem:
@@ -185,6 +194,13 @@ class _Problem:
         self.acceleration = {
             column: functions.terms.index(name) for column, name in enumerate(ACCELERATIONS) if name in functions.terms
         }
+        self.rows, self.axes = np.array(self.places, dtype=np.int64).reshape(-1, 2).T
+        self.accelerating = [
+            (axis, column, self.index[k, axis])
+            for column, k in self.acceleration.items()
+            for axis in range(3)
+            if (k, axis) in self.index
+        ]
         size = len(self.places)
         self.cost = np.zeros((size, size))
         for axis in range(3):
@@ -193,23 +209,24 @@ class _Problem:
             self.cost[np.ix_(own, own)] = information[axis][np.ix_(terms, terms)]
 
     def flat(self, gains: Floats) -> Floats:
-        return np.array([gains[place] for place in self.places])
+        """Return gains, shape (..., K, 3), as vectors, (..., size)."""
+        return np.asarray(gains[..., self.rows, self.axes])
 
     def gains(self, flat: Floats) -> Floats:
-        out = np.zeros((len(self.functions.terms), 3))
-        for place, value in zip(self.places, flat, strict=True):
-            out[place] = value
+        """Return vectors, shape (..., size), as gains, (..., K, 3)."""
+        out = np.zeros((*flat.shape[:-1], len(self.functions.terms), 3))
+        out[..., self.rows, self.axes] = flat
         return out
 
     def G(self, flat: Floats) -> Floats:
-        G = np.eye(3)
-        for column, k in self.acceleration.items():
-            for axis in range(3):
-                if (k, axis) in self.index:
-                    G[axis, column] -= flat[self.index[k, axis]]
+        """Return what the accelerations' gains make of the base model's mass matrix, shape (..., 3, 3)."""
+        G = np.broadcast_to(np.eye(3), (*flat.shape[:-1], 3, 3)).copy()
+        for axis, column, number in self.accelerating:
+            G[..., axis, column] -= flat[..., number]
         return G
 
     def mass(self, flat: Floats) -> Floats:
+        """Return the mass matrix, shape (..., 3, 3)."""
         return np.asarray(np.linalg.solve(self.G(flat), self.mass0))
 
     def tied(self, wanted: Floats, ties: Sequence[LiftTie]) -> tuple[Floats, _Pull]:
@@ -233,9 +250,9 @@ class _Problem:
     def _lift(self, flat: Floats, ties: Sequence[LiftTie]) -> tuple[Floats, Floats]:
         """Return what tied coefficients have beyond the mass's share, (ties,), and its slope over the gains."""
         step = 1e-6 * np.eye(len(flat))
-        every = np.array([self.gains(one) for one in (flat, *(flat + step), *(flat - step))])
-        theta, _ = to_force(every, np.zeros((len(every), 3)), self.functions.terms, self.mass0)
-        added = np.array([self.mass(self.flat(one)) - self.mass0 for one in every])
+        every = np.vstack([flat, flat + step, flat - step])
+        theta, _ = to_force(self.gains(every), np.zeros((len(every), 3)), self.functions.terms, self.mass0)
+        added = self.mass(every) - self.mass0
         lift = np.zeros((len(every), len(ties)))
         for number, one in enumerate(ties):
             own = sum((factor * added[:, row, column] for row, column, factor in one.masses), np.zeros(len(every)))
@@ -246,10 +263,8 @@ class _Problem:
         """Return ``x' M^-1 y`` as a function of the gains: ``M^-1 = M0^-1 G``, slope and constant."""
         left = np.linalg.solve(self.mass0.T, x)
         slope = np.zeros(len(self.places))
-        for column, k in self.acceleration.items():
-            for axis in range(3):
-                if (k, axis) in self.index:
-                    slope[self.index[k, axis]] -= left[axis] * y[column]
+        for axis, column, number in self.accelerating:
+            slope[number] -= left[axis] * y[column]
         return slope, float(left @ y)
 
     def symmetry(self) -> list[tuple[Floats, float, str]]:
@@ -294,7 +309,8 @@ class _Problem:
                 )
         return cuts
 
-    def dissipation(self, flat: Floats, points: Floats) -> list[tuple[Floats, float, str]]:
+    def damping(self, points: Floats) -> _Damping:
+        """Return what acts at velocities, shape (p, 3), beside the accelerations."""
         still = np.zeros_like(points)
         across = np.zeros((len(points), 2))
         functions = self.functions
@@ -307,11 +323,14 @@ class _Problem:
         motion = np.array([not term.endswith("_dot") and "_r" not in term for term in functions.terms])
         phi = np.where(motion, phi, 0.0)
         base = motion_force(self.profile, self.scale, still, points, across[:, 0])
+        return _Damping(points, phi[:, self.rows], -np.einsum("pi,pi->p", points, base))
+
+    def dissipation(self, flat: Floats, damping: _Damping) -> list[tuple[Floats, float, str]]:
+        """Return that at each velocity the damping takes energy."""
+        points, levels = damping.points, damping.levels.tolist()
         power = np.linalg.solve(self.G(flat).T, points.T).T
-        terms, axes = np.array(self.places, dtype=np.int64).reshape(-1, 2).T
-        slopes = power[:, axes] * phi[:, terms]
-        slopes[:, np.isin(terms, list(self.acceleration.values()))] = 0.0
-        levels = (-np.einsum("pi,pi->p", points, base)).tolist()
+        slopes = power[:, self.axes] * damping.functions
+        slopes[:, np.isin(self.rows, list(self.acceleration.values()))] = 0.0
         told = "The data want damping in {} that feeds the motion: it is held at none."
         surge, others = (told.format(which) for which in ("surge", "sway and yaw"))
         return [

@@ -18,6 +18,12 @@ _PROBES = 8
 """Random vectors by which the trace of an inverse is estimated (Hutchinson 1990)."""
 
 
+def _probes(J: int) -> tuple[Floats, Floats]:
+    """Return the random vectors of J windows: of their gusts, shape (2 J, `_PROBES`), and of their targets, (J, `_PROBES`)."""
+    rng = np.random.default_rng(0)
+    return rng.choice([-1.0, 1.0], (2 * J, _PROBES)), rng.choice([-1.0, 1.0], (J, _PROBES))
+
+
 @dataclass(frozen=True, eq=False)
 class GustEquations:
     """Banded precision of the gusts of one log, given hull and conditions.
@@ -83,6 +89,7 @@ class Gusts:
         self._follows = [np.diff(run) == 0 for run in runs]
         self._sums = list[tuple[float, int]]()
         self.uncertain = np.zeros(3)
+        self._probes = [_probes(len(run)) for run in runs]
 
     def precision(self, k: int) -> tuple[Floats, Floats]:
         """Return diagonal (J,) and neighbours (J - 1,) of the precision of a process of unit variance in one log."""
@@ -110,9 +117,8 @@ class Gusts:
 
     def _uncertain(self, k: int, equations: GustEquations) -> None:
         """Add up the expected squares of what remains uncertain, in the measure of the process and in the targets."""
-        size, rng = equations.bands.shape[1], np.random.default_rng(0)
-        process = rng.choice([-1.0, 1.0], (size, _PROBES))
-        signs = rng.choice([-1.0, 1.0], (size // 2, _PROBES))
+        size = equations.bands.shape[1]
+        process, signs = self._probes[k]
         targets = (equations.slope.transpose(0, 2, 1)[..., None] * signs[:, None, None, :]).reshape(size, 3, _PROBES)
         # One factorisation for all of them.
         found = equations.solve(np.column_stack([process, targets.reshape(size, -1)]))

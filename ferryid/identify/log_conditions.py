@@ -225,7 +225,7 @@ def estimate_conditions(
             loads[k].of(wind[k] + problem.gusts.found[k]) if k in loads else np.zeros((len(one), 3))
             for k, one in enumerate(windows)
         ),
-        problem.added,
+        problem.added(),
     )
 
 
@@ -305,7 +305,8 @@ class _Problem:
         self.steady = [np.column_stack([np.ones(len(one)), one.heading]) for one in windows]
         self.wind_spread, self.force_spread = IDENTIFY.wind_spread_mps, 0.1
         self.gusts = Gusts([one.run for one in windows], stride_s)
-        self.added = np.zeros((3, len(terms) + 1, len(terms) + 1))
+        self.inverse: Floats = np.zeros((self.P, self.P))
+        self.bare: Floats = np.zeros((self.P, self.P))
         self.factor, self.noise, self.offset_spread = 1.0, 1.0, 0.1
         targets = [np.zeros((1, 3)), *(self._table(k, np.zeros((len(one), 3)))[1] for k, one in enumerate(windows))]
         self.sigma = np.maximum(np.std(np.concatenate(targets), axis=0), IDENTIFY.no_force)
@@ -391,7 +392,7 @@ class _Problem:
             if len(left[-1]):
                 forces.append(float(np.mean(squares[2:])))
         self._take(hull, np.diag(inverse))
-        self._add(inverse - np.linalg.pinv(bare, hermitian=True))
+        self.inverse, self.bare = np.asarray(inverse), np.asarray(bare)
         self._spreads(winds, forces)
         self._noise(left)
         self.gusts.update()
@@ -421,11 +422,14 @@ class _Problem:
         prior = np.repeat([self.wind_spread, self.force_spread], [2, 9]) ** -2.0
         return _Equations.of(tuple(columns), self.P, weight, prior, self.gusts.equations(k, slope, weight))
 
-    def _add(self, covariance: Floats) -> None:
-        """Keep what the conditions add to the covariance of gains and intercepts."""
+    def added(self) -> Floats:
+        """Return what the conditions add to the covariance of gains and intercepts, shape (3, K + 1, K + 1)."""
+        covariance = self.inverse - np.linalg.pinv(self.bare, hermitian=True)
+        added = np.zeros((3, len(self.terms) + 1, len(self.terms) + 1))
         for axis, own in enumerate(self.own):
             part, places = slice(self.low[axis], self.low[axis + 1]), [*own.tolist(), len(self.terms)]
-            self.added[axis][np.ix_(places, places)] = covariance[part, part]
+            added[axis][np.ix_(places, places)] = covariance[part, part]
+        return added
 
     def _spreads(self, winds: Sequence[float], forces: Sequence[float]) -> None:
         """Update the spreads of winds and steady forces between logs."""
