@@ -20,6 +20,7 @@ from ferryid.identify.log_conditions import LoadSamples
 from ferryid.identify.log_windows import LogWindows
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.weak_rows import WeakRows
+from ferryid.identify.window_length import TRAINING_LENGTHS
 from ferryid.regression.bases.basis import make_basis
 from ferryid.regression.cross_products import CrossProducts
 from ferryid.regression.cross_validation.block_sums import BlockSums
@@ -58,7 +59,13 @@ def run(quick: bool) -> Section:
         read = [_one_pass(rows) for _ in range(3)]
     peak = max(memory for _, memory in (*fitted, *swept))
     table = [
-        faster_row(f"{what}, {rows:,} rows in {logs} logs, whole process", [one for one, _ in took], name, read, None)
+        faster_row(
+            f"{what}, {rows:,} rows in {logs} logs, whole process",
+            [one for one, _ in took],
+            name,
+            read[-len(took) :],
+            None,
+        )
         for what, took, name in (
             ("fit with 500 bootstrap draws", fitted, "one pass over the rows in memory"),
             ("sweep of components, by stretches and by logs", swept, "one pass over the rows in memory"),
@@ -68,7 +75,8 @@ def run(quick: bool) -> Section:
     notes = [
         f"Kept of {logs} logs: {size / 1e6:.0f} MB of sums, 36 blocks in three pieces each. Peak memory of the process: "
         f"{peak / 1e9:.2f} GB (goal: at most 1).",
-        f"For the weak form: {windows / 1e6:.0f} MB of windows of 8 s, all of which a fit holds: {weak_peak / 1e9:.2f} GB.",
+        f"For the weak form: {windows / 1e6:.0f} MB of windows of {len(TRAINING_LENGTHS)} lengths, all of which a fit holds: "
+        f"{weak_peak / 1e9:.2f} GB.",
         "The pass over the rows forms basis and cross-products in chunks from arrays in memory, once; ingestion and smoothing, "
         "which the sums save as well, are not counted.",
     ]
@@ -128,10 +136,14 @@ def _season(out: Path, logs: int) -> None:
     (path,) = folder.glob("pieces-*.parquet")
     _, told = block_sum_store.read_table(path)
     long = _lengthened(one)
-    kept = window_store.load_windows(folder, PROFILE, settings, divided=True)
-    (windows_path,) = folder.glob("windows-*.parquet")
-    _, windows_told = block_sum_store.read_table(windows_path)
-    longer = _repeated(kept)
+    usual_s = window_store.load_windows(folder, PROFILE, settings, divided=True).length_s
+    for share in TRAINING_LENGTHS:
+        window_store.load_windows(folder, PROFILE, replace(settings, weak_window_s=share * usual_s), divided=True)
+    windows = {}
+    for kept in folder.glob("windows-*.parquet"):
+        key = block_sum_store.read_table(kept)[1]["key"]
+        of_length = replace(settings, weak_window_s=key["weak_window_s"])
+        windows[kept.name] = key, _repeated(window_store.load_windows(folder, PROFILE, of_length, divided=True))
     for number in range(logs):
         name, sha256 = f"day{number:04d}", f"{number:08x}".ljust(64, "0")
         place = out / "logs" / f"{name}-{sha256[:8]}-{PROFILE.sha256[:8]}"
@@ -141,9 +153,8 @@ def _season(out: Path, logs: int) -> None:
             note_text({**note, "files": [[name, 0, number, number]], "recording": recording}), encoding="utf-8"
         )
         block_sum_store.write_block_sums(place / path.name, told["key"], replace(long, name=name, sha256=sha256))
-        window_store.write_windows(
-            place / windows_path.name, windows_told["key"], replace(longer, name=name, sha256=sha256)
-        )
+        for file, (key, longer) in windows.items():
+            window_store.write_windows(place / file, key, replace(longer, name=name, sha256=sha256))
     for file in folder.iterdir():
         file.unlink()
     folder.rmdir()
