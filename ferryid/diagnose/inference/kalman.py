@@ -3,6 +3,8 @@
 The states of each channel are what disturbances have made of the position and the velocity, the error of the measurement with
 its rate, and a disturbance of the channel's own; then come shared disturbances, whose states push on all channels.
 Gains depend on the noise alone and are computed once; every column of a linear problem then passes through the same filter.
+What only leads from one series to the next is left to Python: compiled, it would hold all that it calls once more, which took
+half of the time that the first diagnosis spends on compiling.
 """
 
 from __future__ import annotations
@@ -99,7 +101,6 @@ def kept(noise: Floats, step_s: float) -> Floats:
     return keep
 
 
-@compiled
 def gains(
     scale: Floats, noise: Floats, integrals: int, blocks: Floats, drive: Floats, columns: Floats, step_s: float
 ) -> tuple[Floats, Floats]:
@@ -130,22 +131,40 @@ def gains(
     ndarray
         Standard deviation of every prediction, shape (n, c).
     """
+    narrow = CHANNEL_STATES * columns.shape[1] + columns.shape[2] <= WIDE
+    return (_gains_of_narrow if narrow else _gains_of_wide)(scale, noise, integrals, blocks, drive, columns, step_s)
+
+
+@compiled
+def _gains_of_narrow(
+    scale: Floats, noise: Floats, integrals: int, blocks: Floats, drive: Floats, columns: Floats, step_s: float
+) -> tuple[Floats, Floats]:
+    """Return `gains` of a filter of at most `WIDE` states."""
     n, c, s = columns.shape
     S = CHANNEL_STATES * c + s
     K, spread, keep = np.zeros((n, c, S)), np.empty((n, c)), kept(noise, step_s)
-    if S <= WIDE:
-        # Rows at distances that are known when this is compiled: only so are loops over several of them vectorised.
-        P, Q, turned = np.zeros((S, WIDE)), np.zeros((S, WIDE)), np.zeros((S, WIDE))
-        sights, scratch = np.zeros((c, WIDE)), np.zeros((s, WIDE))
-        run_covariances(
-            scale, noise, integrals, blocks, drive, columns, step_s, keep, P, Q, turned, sights, scratch, K, spread
-        )
-    else:
-        P_, Q_, turned_ = np.zeros((S, S)), np.zeros((S, S)), np.zeros((S, S))
-        sights_, scratch_ = np.zeros((c, S)), np.zeros((s, S))
-        run_covariances(
-            scale, noise, integrals, blocks, drive, columns, step_s, keep, P_, Q_, turned_, sights_, scratch_, K, spread
-        )
+    # Rows at distances that are known when this is compiled: only so are loops over several of them vectorised.
+    P, Q, turned = np.zeros((S, WIDE)), np.zeros((S, WIDE)), np.zeros((S, WIDE))
+    sights, scratch = np.zeros((c, WIDE)), np.zeros((s, WIDE))
+    run_covariances(
+        scale, noise, integrals, blocks, drive, columns, step_s, keep, P, Q, turned, sights, scratch, K, spread
+    )
+    return K, spread
+
+
+@compiled
+def _gains_of_wide(
+    scale: Floats, noise: Floats, integrals: int, blocks: Floats, drive: Floats, columns: Floats, step_s: float
+) -> tuple[Floats, Floats]:
+    """Return `gains` of a filter of more states."""
+    n, c, s = columns.shape
+    S = CHANNEL_STATES * c + s
+    K, spread, keep = np.zeros((n, c, S)), np.empty((n, c)), kept(noise, step_s)
+    P, Q, turned = np.zeros((S, S)), np.zeros((S, S)), np.zeros((S, S))
+    sights, scratch = np.zeros((c, S)), np.zeros((s, S))
+    run_covariances(
+        scale, noise, integrals, blocks, drive, columns, step_s, keep, P, Q, turned, sights, scratch, K, spread
+    )
     return K, spread
 
 
@@ -270,10 +289,10 @@ def _errors_of_few(
     h, half = step_s, 0.5 * step_s * step_s
     known = 0 if integrals == 2 else 1
     keep = kept(noise, step_s)
-    x, scratch = np.empty(S), np.empty(s)
+    scratch = np.empty(s)
     out = np.empty((n, c, q))
     for m in range(q):
-        x[:] = 0.0
+        x = np.zeros(S)
         for k in range(n):
             for j in range(c):
                 error = series[k, j, m] - x[CHANNEL_STATES * j + known] - x[CHANNEL_STATES * j + 2]
@@ -336,7 +355,6 @@ def _errors_of_many(
     return out
 
 
-@compiled
 def errors(
     K: Floats,
     spread: Floats,
@@ -363,9 +381,8 @@ def errors(
     ndarray
         Shape (n, c, q).
     """
-    if series.shape[2] <= FEW:
-        return _errors_of_few(K, spread, noise, integrals, blocks, columns, step_s, series)
-    return _errors_of_many(K, spread, noise, integrals, blocks, columns, step_s, series)
+    of_series = _errors_of_few if series.shape[2] <= FEW else _errors_of_many
+    return of_series(K, spread, noise, integrals, blocks, columns, step_s, series)
 
 
 @borrowing
@@ -398,7 +415,6 @@ def summed(gaps: Floats, integrals: int, step_s: float) -> Floats:
     return out
 
 
-@compiled
 def gains_alone(
     scale: Floats, noise: Floats, integrals: int, step_s: float, runs: Ints, n: int
 ) -> tuple[Floats, Floats]:
@@ -420,20 +436,14 @@ def gains_alone(
     ndarray
         Standard deviation of every prediction, shape (n, c).
     """
-    c, longest = noise.shape[0], 0
-    for run in range(runs.shape[0]):
-        longest = max(longest, runs[run, 1] - runs[run, 0])
+    c, longest = len(noise), int(np.max(runs[:, 1] - runs[:, 0], initial=0))
     blocks, drive, columns = np.empty((0, 0)), np.empty((2, 0, 0)), np.empty((longest, 1, 0))
     K, spread = np.zeros((n, c, CHANNEL_STATES)), np.ones((n, c))
     for j in range(c):
         # Every series begins alike: the longest has the gains of all.
         own, scales = gains(scale[j : j + 1], noise[j : j + 1], integrals, blocks, drive, columns, step_s)
-        for run in range(runs.shape[0]):
-            first = runs[run, 0]
-            for k in range(first, runs[run, 1]):
-                spread[k, j] = scales[k - first, 0]
-                for i in range(CHANNEL_STATES):
-                    K[k, j, i] = own[k - first, 0, i]
+        for first, end in runs.tolist():
+            K[first:end, j], spread[first:end, j] = own[: end - first, 0], scales[: end - first, 0]
     return K, spread
 
 
@@ -537,7 +547,6 @@ def whitened_alone(
     return out
 
 
-@compiled
 def gains_together(
     scale: Floats,
     noise: Floats,
@@ -566,13 +575,11 @@ def gains_together(
     """
     n, c, s = columns.shape
     K, spread = np.zeros((n, c, CHANNEL_STATES * c + s)), np.ones((n, c))
-    for run in range(runs.shape[0]):
-        first, end = runs[run, 0], runs[run, 1]
+    for first, end in runs.tolist():
         K[first:end], spread[first:end] = gains(scale, noise, integrals, blocks, drive, columns[first:end], step_s)
     return K, spread
 
 
-@compiled
 def whitened_together(
     gaps: Floats,
     runs: Ints,
@@ -596,15 +603,13 @@ def whitened_together(
         From it.
     """
     out = np.zeros(gaps.shape)
-    for run in range(runs.shape[0]):
-        first, end = runs[run, 0], runs[run, 1]
+    for first, end in runs.tolist():
         series = summed(gaps[first:end], integrals, step_s)
         given = K[first:end], spread[first:end], noise, integrals, blocks, columns[first:end], step_s, series
         out[first + DIFFUSE : end] = errors(*given)[DIFFUSE:]
     return out
 
 
-@compiled
 def predictions_alone(
     scale: Floats, noises: Floats, integrals: int, step_s: float, gaps: Floats, runs: Ints
 ) -> tuple[Floats, Floats]:
@@ -634,13 +639,20 @@ def predictions_alone(
         noise = noises[i : i + 1]
         K, spread = gains_alone(scale, noise, integrals, step_s, runs, n)
         whitened[i] = whitened_alone(gaps, runs, K, spread, noise, integrals, step_s)[:, 0]
-        for run in range(runs.shape[0]):
-            last, size = 0.0, 0.0
-            for k in range(runs[run, 0] + DIFFUSE, runs[run, 1]):
-                # Most are alike.
-                if spread[k, 0] != last:
-                    last = spread[k, 0]
-                    size = np.log(last)
-                for m in range(q):
-                    log_scales[i, k, m] = size
+        log_scales[i] = _log_scales(spread[:, 0], runs)[:, None]
     return whitened, log_scales
+
+
+@compiled
+def _log_scales(spread: Floats, runs: Ints) -> Floats:
+    """Return the logarithm of standard deviations, shape (n,), zero for the first steps of every series."""
+    out = np.zeros(spread.shape[0])
+    for run in range(runs.shape[0]):
+        last, size = 0.0, 0.0
+        for k in range(runs[run, 0] + DIFFUSE, runs[run, 1]):
+            # Most are alike.
+            if spread[k] != last:
+                last = spread[k]
+                size = np.log(last)
+            out[k] = size
+    return out
