@@ -12,7 +12,16 @@ from scipy.stats import chi2, multivariate_normal
 
 from ferryid.diagnose.inference.autoregression import ORDER, AutoregressiveNoise
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, fit
-from ferryid.diagnose.inference.kalman import DIFFUSE, FEW, errors, gains, predictions_alone, summed, whitened_alone
+from ferryid.diagnose.inference.kalman import (
+    DIFFUSE,
+    FEW,
+    WIDE,
+    errors,
+    gains,
+    predictions_alone,
+    summed,
+    whitened_alone,
+)
 from ferryid.diagnose.inference.noise_estimation import _widths, excerpt, fit_noise
 from ferryid.diagnose.inference.noise_model import NoiseModel, likelihood, make_whitening_filter, stride_s
 from ferryid.diagnose.inference.thresholds import INFERENCE
@@ -143,6 +152,25 @@ def test_series_are_filtered_alike_in_any_number_and_from_where_they_begin(integ
         )
         # Its first value, of the channel that is looked at first, is all that it is off.
         np.testing.assert_allclose(together[4 * m, 0, m] * spread[4 * m, 0], series[4 * m, 0, m], rtol=1e-12)
+
+
+@pytest.mark.slow
+def test_a_filter_of_many_states_has_the_gains_of_one_of_few() -> None:
+    n, h, idle = 40, 0.4, WIDE
+    rng = np.random.default_rng(5)
+    few = 0.9 * np.eye(2), np.stack([0.2 * np.eye(2), np.eye(2)]), 0.01 * rng.standard_normal((n, 3, 2))
+    blocks, drive, columns = (
+        np.zeros((2 + idle, 2 + idle)),
+        np.zeros((2, 2 + idle, 2 + idle)),
+        np.zeros((n, 3, 2 + idle)),
+    )
+    # Beside states that nothing drives and that push on nothing.
+    blocks[:2, :2], drive[:, :2, :2], columns[:, :, :2] = few
+    K, spread = gains(np.ones(3), TRUE[[0, 0, 2]], 2, *few, h)
+    many, alike = gains(np.ones(3), TRUE[[0, 0, 2]], 2, blocks, drive, columns, h)
+    np.testing.assert_allclose(many[:, :, : K.shape[2]], K, rtol=1e-12)
+    np.testing.assert_allclose(alike, spread, rtol=1e-12)
+    assert not many[:, :, K.shape[2] :].any()
 
 
 @pytest.mark.parametrize("integrals", [2, 1], ids=["positions", "velocities"])
