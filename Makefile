@@ -47,7 +47,8 @@ picture: demo
 	cp $(DEMO)/reports/milliampere-v1/forces-twelve-corner.svg reports/demo/forces.svg
 	$(BIN)/python -m tests.evidence reports/demo/forces.svg
 
-# Writes reports/benchmarks.md; QUICK=1 prints the page of a run on short logs instead, to see that everything runs.
+# Writes reports/benchmarks.md; QUICK=1 prints the page of a run on short logs instead, to see that everything runs. A run that
+# was ended goes on with the tables that are missing, as long as no source has changed.
 bench: $(VENV)/installed $(VENV)/bench-installed
 	$(BIN)/python -m tests.bench $(if $(QUICK),--quick)
 

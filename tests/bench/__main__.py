@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import pkgutil
 import sys
 from functools import partial
 from pathlib import Path
 
-import tests.bench as benches
+from tests.bench import kept
 from tests.bench.page import drawing, page
 from tests.evidence import stamp
 
@@ -28,15 +27,20 @@ def main() -> int:
     )
     parser.add_argument("--only", choices=MODULES, help="measure one part only")
     options = parser.parse_args()
-    there = {module.name for module in pkgutil.iter_modules(benches.__path__)}
+    whole = not (options.quick or options.only)
     sections = []
     for name in MODULES:
-        if name in there and options.only in (None, name):
-            run = importlib.import_module(f"tests.bench.{name}").run
-            if name == "ingest" and options.folder:
-                run = partial(run, folder=options.folder)
-            sections.append(run(options.quick))
-    target = options.out or (None if options.quick or options.only else REPORT)
+        if options.only in (None, name):
+            section = kept.read(name) if whole else None
+            if section is None:
+                run = importlib.import_module(f"tests.bench.{name}").run
+                if name == "ingest" and options.folder:
+                    run = partial(run, folder=options.folder)
+                section = run(options.quick)
+                if whole:
+                    kept.write(name, section)
+            sections.append(section)
+    target = options.out or (REPORT if whole else None)
     if target is None or str(target) == "-":
         print(page(sections, options.quick))
     else:
@@ -44,6 +48,7 @@ def main() -> int:
         picture.write_text(drawing(sections), encoding="utf-8")
         target.write_text(page(sections, options.quick, picture.name), encoding="utf-8")
         stamp(target)
+        kept.remove()
         print(f"written to {target}")
     missed = [row.what for section in sections for row in section.rows if row.reached is False]
     for what in missed:

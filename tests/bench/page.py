@@ -127,7 +127,7 @@ def page(sections: Sequence[Section], quick: bool, picture: str = "") -> str:
         "# Benchmarks",
         "",
         "Written by `make bench`. Every ratio is the median of ratios of neighbouring runs of ours and the rival,",
-        "in one process run and with a warm page cache. “Reached” compares it with the goal.",
+        "and of one run of its table, with a warm page cache. “Reached” compares it with the goal.",
         "",
         f"{os.cpu_count()} cores ({platform.machine()}), Python {platform.python_version()}, {versions}.",
         "",
