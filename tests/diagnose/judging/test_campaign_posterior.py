@@ -93,11 +93,14 @@ def test_a_guessed_hull_is_not_kept() -> None:
 def test_a_copy_of_a_log_teaches_nothing() -> None:
     own = Posterior({}, {}, (), (StoredEffect("payload", None, {}, ()),))
     diagnosis = Diagnosis("log1", "milliampere", "explained", (wind(),), {}, {}, posterior=own)
-    log = cast(
-        AveragedLog, SimpleNamespace(path="log1", screened=SimpleNamespace(measured=SimpleNamespace(survey=survey())))
+    screened = SimpleNamespace(
+        measured=SimpleNamespace(survey=survey()),
+        measurements=SimpleNamespace(profile=SimpleNamespace(given_as="boats/vessel.toml")),
     )
+    log = cast(AveragedLog, SimpleNamespace(path="log1", screened=screened))
     alone, copy = (_with_origin(diagnosis, log, campaign(), other) for other in (None, "log0"))
     assert alone.posterior is not None
     assert not alone.copy
+    assert alone.profile == "boats/vessel.toml"
     assert copy.posterior is None
     assert copy.copy
