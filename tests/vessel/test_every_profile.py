@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -33,3 +35,11 @@ def test_description_names_every_part(name: str) -> None:
         row = next(line for line in lines if line.startswith(f"{signal.quantity} "))
         assert signal.topic in row
         assert signal.unit in row
+
+
+def test_a_profile_is_given_by_its_file_or_by_its_name(tmp_path: Path) -> None:
+    bundled = load_profile("milliampere")
+    assert bundled.given_as == "milliampere"
+    own = tmp_path / "vessel.toml"
+    own.write_text(bundled.text, encoding="utf-8")
+    assert load_profile(own).given_as == str(own)
