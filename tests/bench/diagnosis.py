@@ -147,8 +147,10 @@ def _where(folder: Path, paths: list[Path], what: str) -> list[str]:
 
 
 def _written(folder: Path, number: int, seconds: int) -> Path:
-    """Simulate a log of this length; those of a campaign begin one after the other, each in a wind of its own."""
+    """Simulate a log of this length, once; those of a campaign begin one after the other, each in a wind of its own."""
     path = folder / f"log{number}-{seconds}.mcap"
+    if path.exists():
+        return path
     start = 8 * 3600 + number * (seconds + 60)
     clock = f"{start // 3600 % 24:02d}:{start % 3600 // 60:02d}:{start % 60:02d}"
     angle = 2.4 * number
