@@ -122,14 +122,14 @@ def drawing(sections: Sequence[Section]) -> str:
 def page(sections: Sequence[Section], quick: bool, picture: str = "") -> str:
     """Return the page of all sections in Markdown, with the address of their `drawing`."""
     packages = sorted({name for section in sections for name in section.packages})
-    versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in packages)
+    versions = "".join(f", {name} {importlib.metadata.version(name)}" for name in packages)
     lines = [
         "# Benchmarks",
         "",
         "Written by `make bench`. Every ratio is the median of ratios of neighbouring runs of ours and the rival,",
         "and of one run of its table, with a warm page cache. “Reached” compares it with the goal.",
         "",
-        f"{os.cpu_count()} cores ({platform.machine()}), Python {platform.python_version()}, {versions}.",
+        f"{os.cpu_count()} cores ({platform.machine()}), Python {platform.python_version()}{versions}.",
         "",
     ]
     if quick:
