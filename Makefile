@@ -130,13 +130,13 @@ wheel-check: $(VENV)/installed
 	$(BIN)/pip wheel --quiet --no-deps --wheel-dir dist .
 	$(PYTHON) -m venv $(VENV)/wheel
 	$(VENV)/wheel/bin/pip install --quiet --constraint constraints.txt pipx uv
-	PIP_NO_COMPILE=1 PIPX_HOME=$(abspath $(VENV)/wheel/pipx) PIPX_BIN_DIR=$(abspath $(VENV)/wheel/apps) PIP_CONSTRAINT=$(abspath constraints.txt) \
-	  $(VENV)/wheel/bin/pipx install --quiet dist/*.whl
+	PIPX_HOME=$(abspath $(VENV)/wheel/pipx) PIPX_BIN_DIR=$(abspath $(VENV)/wheel/apps) \
+	  PIP_CONSTRAINT=$(abspath constraints.txt) PIP_NO_COMPILE=1 $(VENV)/wheel/bin/pipx install --quiet dist/*.whl
 	UV_CONSTRAINT=$(abspath constraints.txt) $(VENV)/wheel/bin/uvx --quiet --from dist/*.whl ferryid --version
 	cd $(VENV)/wheel && apps/ferryid doctor && apps/ferryid simulate four-corner --log four.bag --overwrite \
 	  && apps/ferryid fit four.bag --vessel milliampere --out out && apps/ferryid models --out out
 
-# uv takes half the time of pip, which does it where uv cannot be had or is not set up for the index that pip knows.
+# uv is quicker than pip, which does it where uv cannot be had or is not set up for the index that pip knows.
 PIP = $(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt
 install = $(PIP) uv && $(BIN)/uv pip install --quiet --compile-bytecode --python $(BIN)/python --constraint constraints.txt \
 	  --editable '$(1)' || $(PIP) --editable '$(1)'

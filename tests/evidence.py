@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 MAKERS: Mapping[str, tuple[str, ...]] = {
@@ -140,6 +141,53 @@ def read(root: Path = ROOT) -> dict[str, dict[str, object]]:
     """Return the states of all pages."""
     path = root / STATES
     return dict(json.loads(path.read_text(encoding="utf-8"))) if path.is_file() else {}
+
+
+@dataclass(frozen=True)
+class Lines:
+    """Results of one unit of work each, so that a run that was ended goes on: only those of the present sources count.
+
+    Attributes
+    ----------
+    path
+        The file, of lines of JSON; it need not be there.
+    sources
+        Hash of all sources that results depend on.
+    """
+
+    path: Path
+    sources: str
+
+    @classmethod
+    def of(cls, path: Path, page: str) -> Lines:
+        """Return the lines in a file for the sources of a page as they are."""
+        every = json.dumps(state(page), sort_keys=True)
+        return cls(path, hashlib.sha256(every.encode()).hexdigest()[:16])
+
+    def known(self) -> dict[str, Any]:
+        """Return the results that are there, by the name of their unit; the last line may be cut off."""
+        found = {}
+        for line in self._read():
+            if line["sources"] == self.sources:
+                found[line["unit"]] = line["result"]
+        return found
+
+    def _read(self) -> Iterator[dict[str, Any]]:
+        if not self.path.exists():
+            return
+        for text in self.path.read_text(encoding="utf-8").splitlines():
+            try:
+                yield json.loads(text)
+            except json.JSONDecodeError:
+                continue
+
+    def add(self, unit: str, result: Any) -> None:
+        """Append a result."""
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        text = json.dumps({"sources": self.sources, "unit": unit, "result": result})
+        begun = self.path.exists() and not self.path.read_bytes().endswith(b"\n")
+        with self.path.open("a", encoding="utf-8") as file:
+            file.write(("\n" if begun else "") + text + "\n")
 
 
 def ages(root: Path = ROOT) -> tuple[Age, ...]:

@@ -7,7 +7,11 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+import pytest
+
+from ferryid.batch import run as running
 from ferryid.batch.run import batch
+from ferryid.batch.spread import spread
 from ferryid.report.batch_rows import BatchResult
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
@@ -43,6 +47,11 @@ def rows_of(folder: Path) -> dict[str, tuple[int, int]]:
         path.parent.name: (path.stat().st_ino, path.stat().st_mtime_ns)
         for path in (folder / "out" / "batch" / "results").glob("*/row.json")
     }
+
+
+def stay_here(patch: pytest.MonkeyPatch) -> None:
+    """Let a batch work in this process, which has loaded everything."""
+    patch.setattr(running, "spread", lambda processes, dask, *, apart: spread())
 
 
 def same(result: BatchResult) -> str:

@@ -24,12 +24,12 @@ from ferryid.batch import kept, steps, task
 from ferryid.batch import run as running
 from ferryid.batch.log_result import LogFile, LogResult, StepSummary
 from ferryid.batch.remaining import Remaining, told_time
-from ferryid.batch.spread import _Pool, spread
+from ferryid.batch.spread import Spread, spread
 from ferryid.errors import FerryIdError, UnwritableError
 from ferryid.files import dump_json, unwritable
 from ferryid.report.batch_rows import BatchResult
 from ferryid.vessel import load_profile
-from tests.batch.archive import archive, recipe, rows_of, run, same
+from tests.batch.archive import archive, recipe, rows_of, run, same, stay_here
 from tests.batch.work import blank, children_of, deadly, default_interrupts, ended, environment
 from tests.cli.test_every_command import conforms
 
@@ -57,7 +57,7 @@ def results(folder: Path) -> Path:
 @pytest.fixture
 def here(monkeypatch: pytest.MonkeyPatch) -> None:
     """Work in this process: for what becomes of rows and results, whichever process makes them."""
-    monkeypatch.setattr(running, "spread", lambda processes, dask, *, apart: spread())
+    stay_here(monkeypatch)
 
 
 @pytest.mark.usefixtures("here")
@@ -112,15 +112,14 @@ def test_a_process_that_evaluates_loads_no_diagnosis_and_draws_nothing(one: task
 
 
 @pytest.fixture(scope="module")
-def two_processes() -> Iterator[_Pool]:
+def two_processes() -> Iterator[Spread]:
     """Two other processes, which are started once: each loads for a second or two what a log needs."""
-    pool = _Pool(2)
-    yield pool
-    pool.end()
+    with spread(2) as pool:
+        yield pool
 
 
 @pytest.fixture
-def elsewhere(monkeypatch: pytest.MonkeyPatch, two_processes: _Pool) -> None:
+def elsewhere(monkeypatch: pytest.MonkeyPatch, two_processes: Spread) -> None:
     """Work in these processes, and leave figures blank there as well."""
     monkeypatch.setattr(running, "spread", lambda processes, dask, *, apart: nullcontext(two_processes))
     monkeypatch.setattr(running, "work", blank)
@@ -258,7 +257,7 @@ def test_a_log_that_kills_its_process_is_a_row(tmp_path: Path, monkeypatch: pyte
     assert any(line.startswith(f"lost: {logs / 'deadly.mcap'}: its process died") for line in told)
     monkeypatch.undo()
     # It kills no more, and this process does as well.
-    monkeypatch.setattr(running, "spread", lambda processes, dask, *, apart: spread())
+    stay_here(monkeypatch)
     kept_ones, _ = run(tmp_path, logs / "*.mcap")
     assert statuses(kept_ones)["deadly"] == "lost"
     # With more memory it is worth another try.

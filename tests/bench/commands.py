@@ -12,7 +12,7 @@ from pathlib import Path
 from ferryid.batch.kept import key_of, read_row, write_row
 from ferryid.batch.log_result import LogFile
 from ferryid.simulate import load_scenario, simulate, write_log
-from tests.bench.page import Row, Section, duration
+from tests.bench.page import Row, Section, duration, faster_row
 from tests.bench.processes import whole_process
 
 FIT = ("--vessel", "milliampere", "--delta", "0.4", "--sigma", "0.4")
@@ -41,6 +41,7 @@ def run(quick: bool) -> Section:
             _row("ferryid fit, 24 min, with its report", _fits(folder, trial, (), repeats), 1.5),
             _row("ferryid fit --no-report, 24 min", _fits(folder, trial, ("--no-report",), repeats), 0.8),
             _row("ferryid simulate, 12 min", _times([("simulate", str(scenario), *log)] * (repeats + 1))[1:], 1.0),
+            *_compiled(folder, scenario),
             _row(f"ferryid batch, {logs} logs and nothing to do", _resumed(folder / "batch", logs, repeats), 5.0),
         ]
     notes = (
@@ -48,6 +49,20 @@ def run(quick: bool) -> Section:
         "to one file, whose result is kept for each of them under its own name and hash.",
     )
     return Section("Commands", rows, notes, ("numba", "matplotlib", "typer"))
+
+
+def _compiled(folder: Path, scenario: Path) -> list[Row]:
+    """Return how long a first simulation and a first diagnosis take, for which everything is compiled, beside the next."""
+    log, cache = str(folder / "first.mcap"), {"NUMBA_CACHE_DIR": str(folder / "compiled")}
+    diagnosis = ("diagnose", log, "--vessel", "milliampere", "--out", str(folder / "first"))
+    rows = []
+    for what, words in (
+        ("ferryid simulate, 12 min", ("simulate", str(scenario), "--log", log, "--overwrite")),
+        ("ferryid diagnose, 12 min", diagnosis),
+    ):
+        first, again = (whole_process(words, cache)[0] for _ in range(2))
+        rows.append(faster_row(f"{what}, whole process", [again], "the first time, when it is compiled", [first], None))
+    return rows
 
 
 def _fits(folder: Path, trial: Path, more: Sequence[str], repeats: int) -> list[float]:

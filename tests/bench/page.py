@@ -9,8 +9,9 @@ import platform
 import statistics
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from math import log10
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -50,6 +51,16 @@ class Section:
     rows: Sequence[Row]
     notes: Sequence[str] = ()
     packages: Sequence[str] = field(default=())
+
+
+def packed(section: Section) -> dict[str, Any]:
+    """Return a section as plain values."""
+    return asdict(section)
+
+
+def unpacked(plain: dict[str, Any]) -> Section:
+    """Return the section of `packed`."""
+    return Section(**{**plain, "rows": [Row(**row) for row in plain["rows"]]})
 
 
 def in_turn(works: Sequence[Callable[[], object]], repeats: int) -> list[list[float]]:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 
-def whole_process(arguments: Sequence[str]) -> tuple[float, int]:
-    """Return time [s] and peak memory [bytes] of one command in a process of its own."""
+def whole_process(arguments: Sequence[str], environment: Mapping[str, str] | None = None) -> tuple[float, int]:
+    """Return time [s] and peak memory [bytes] of one command in a process of its own, with more in its environment."""
     # What the kernel tells of a child counts in the memory of the process that forked it: the child tells by itself.
     program = (
         "import atexit, sys; from ferryid.cli.main import main; "
@@ -17,7 +18,13 @@ def whole_process(arguments: Sequence[str]) -> tuple[float, int]:
         "main()"
     )
     start = time.perf_counter()
-    run = subprocess.run([sys.executable, "-c", program, *arguments], capture_output=True, text=True, check=False)
+    run = subprocess.run(
+        [sys.executable, "-c", program, *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, **(environment or {})},
+    )
     took = time.perf_counter() - start
     if run.returncode:
         raise RuntimeError(f"ferryid {' '.join(arguments)} ended with {run.returncode}: {run.stderr}")

@@ -35,7 +35,7 @@ def fixtures() -> Path:
 
 @pytest.fixture
 def batch_here(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let a batch work in this process, which has loaded everything; what it does in others is tested in tests/batch."""
-    from ferryid.batch import run, spread
+    """Let a batch work in this process; what it does in others is tested in tests/batch."""
+    from tests.batch.archive import stay_here
 
-    monkeypatch.setattr(run, "spread", lambda processes, dask, *, apart: spread.spread())
+    stay_here(monkeypatch)

@@ -14,10 +14,10 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from tests.evidence import stamp
+from tests.evidence import Lines, stamp
 from tests.real.places import REPORTS, ROOT
 from tests.rivals import second_logs
-from tests.rivals.lines import Lines, packed, unpacked
+from tests.rivals.packing import packed, unpacked
 from tests.rivals.page import (
     ELSEWHERE,
     HEAD,
@@ -48,7 +48,7 @@ def main() -> None:
     parser.add_argument("--processes", type=int, default=2, help="processes side by side")
     parser.add_argument("--page", action="store_true", help="write the page from what is known; run nothing")
     options = parser.parse_args()
-    lines = Lines.of(WORK / "lines.jsonl")
+    lines = Lines.of(WORK / "lines.jsonl", "reports/rivals.md")
     if not options.page:
         run(units(options.trials, options.second, WORK / "logs"), lines, options.processes)
     (REPORTS / "rivals.md").write_text(page(lines.known()), encoding="utf-8")

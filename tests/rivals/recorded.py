@@ -10,7 +10,7 @@ from ferryid.errors import FerryIdError
 from ferryid.signals.prepare import Opened, open_track
 from ferryid.vessel import load_profile
 from tests.real.places import DATA
-from tests.rivals.lines import packed_scores, unpacked_scores
+from tests.rivals.packing import packed_scores, unpacked_scores
 from tests.rivals.scores import Score, judge, together
 from tests.rivals.task import Task
 

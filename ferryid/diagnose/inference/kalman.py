@@ -131,41 +131,41 @@ def gains(
     ndarray
         Standard deviation of every prediction, shape (n, c).
     """
-    narrow = CHANNEL_STATES * columns.shape[1] + columns.shape[2] <= WIDE
-    return (_gains_of_narrow if narrow else _gains_of_wide)(scale, noise, integrals, blocks, drive, columns, step_s)
+    n, c, s = columns.shape
+    S = CHANNEL_STATES * c + s
+    K, spread = np.zeros((n, c, S)), np.empty((n, c))
+    given = scale, noise, integrals, blocks, drive, columns, step_s, kept(noise, step_s)
+    if S <= WIDE:
+        _run_narrow(*given, K, spread)
+    else:
+        P, Q, turned = (np.zeros((S, S)) for _ in range(3))
+        run_covariances(*given, P, Q, turned, np.zeros((c, S)), np.zeros((s, S)), K, spread)
+    return K, spread
 
 
 @compiled
-def _gains_of_narrow(
-    scale: Floats, noise: Floats, integrals: int, blocks: Floats, drive: Floats, columns: Floats, step_s: float
-) -> tuple[Floats, Floats]:
-    """Return `gains` of a filter of at most `WIDE` states."""
-    n, c, s = columns.shape
-    S = CHANNEL_STATES * c + s
-    K, spread, keep = np.zeros((n, c, S)), np.empty((n, c)), kept(noise, step_s)
-    # Rows at distances that are known when this is compiled: only so are loops over several of them vectorised.
+def _run_narrow(
+    scale: Floats,
+    noise: Floats,
+    integrals: int,
+    blocks: Floats,
+    drive: Floats,
+    columns: Floats,
+    step_s: float,
+    keep: Floats,
+    K: Floats,
+    spread: Floats,
+) -> None:
+    """Fill in gains and standard deviations as `run_covariances`, of at most `WIDE` states.
+
+    Rows lie at distances that are known when this is compiled: only so are loops over several of them vectorised.
+    """
+    S, c, s = K.shape[2], columns.shape[1], columns.shape[2]
     P, Q, turned = np.zeros((S, WIDE)), np.zeros((S, WIDE)), np.zeros((S, WIDE))
     sights, scratch = np.zeros((c, WIDE)), np.zeros((s, WIDE))
     run_covariances(
         scale, noise, integrals, blocks, drive, columns, step_s, keep, P, Q, turned, sights, scratch, K, spread
     )
-    return K, spread
-
-
-@compiled
-def _gains_of_wide(
-    scale: Floats, noise: Floats, integrals: int, blocks: Floats, drive: Floats, columns: Floats, step_s: float
-) -> tuple[Floats, Floats]:
-    """Return `gains` of a filter of more states."""
-    n, c, s = columns.shape
-    S = CHANNEL_STATES * c + s
-    K, spread, keep = np.zeros((n, c, S)), np.empty((n, c)), kept(noise, step_s)
-    P, Q, turned = np.zeros((S, S)), np.zeros((S, S)), np.zeros((S, S))
-    sights, scratch = np.zeros((c, S)), np.zeros((s, S))
-    run_covariances(
-        scale, noise, integrals, blocks, drive, columns, step_s, keep, P, Q, turned, sights, scratch, K, spread
-    )
-    return K, spread
 
 
 @borrowing

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from tests.evidence import Lines
 from tests.rivals.__main__ import run
-from tests.rivals.lines import Lines, packed, packed_scores, unpacked, unpacked_scores
+from tests.rivals.packing import packed, packed_scores, unpacked, unpacked_scores
 from tests.rivals.page import OURS, damping_notes
 from tests.rivals.scores import Score
 from tests.rivals.simulated import Found
