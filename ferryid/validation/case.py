@@ -72,6 +72,10 @@ class Case(Record):
         By how many lengths the profile has the first thruster too far forward.
     oracle_size
         Size that an oracle sees, of which `size` is a multiple; 0 where that is not known before the diagnosis.
+    logs
+        How many logs there are, which are a campaign where there are several.
+    first_log
+        Number of the log of a campaign from which on the first of `truths` acts.
     """
 
     name: str
@@ -90,6 +94,8 @@ class Case(Record):
     omitted_terms: tuple[str, ...] = ()
     thruster_shift: float = 0.0
     oracle_size: float = 0.0
+    logs: int = 1
+    first_log: int = 0
 
 
 def parameter_vectors(names: Sequence[str]) -> list[tuple[str, ...]]:

@@ -10,10 +10,10 @@ from zlib import crc32
 import numpy as np
 
 from ferryid.errors import FerryIdError
-from ferryid.validation.case import FORMATS, Case
+from ferryid.validation.case import FORMATS, Case, Truth
 from ferryid.validation.out_of_library import OUT_OF_LIBRARY
 from ferryid.validation.plant.effects import plant_effects
-from ferryid.validation.plant.effects.effect import Injection, PlantEffect, Span
+from ferryid.validation.plant.effects.effect import Injection, PlantEffect, Span, random_vector
 from ferryid.validation.plant.paths import duration_s
 from ferryid.validation.plant.vessels import VESSELS, Vessel
 from ferryid.validation.prior_profile import MASSES, damping
@@ -30,14 +30,17 @@ KINDS = (
     "short",
     "wrong base",
     "outside",
+    "sea",
 )
 """Kinds of cells, in the order of the report."""
 LEVELS = 5
 """Sizes of a detection curve, from invisible to gross."""
 TURNS = (2, 4, 1, 3, 0)
 """Levels in the order of the runs: a few runs are not all of the smallest."""
-TIMES: Mapping[str, float] = {"clean": 12.0, "pair": 4.0, "triple": 2.0}
-"""Runs of a cell for one run of each size, where it is not one."""
+CLEAN_SEA = "sea: nothing"
+"""Cell of the campaigns at sea in which nothing but the weather is concealed."""
+TIMES: Mapping[str, float] = {"clean": 12.0, "pair": 4.0, "triple": 2.0, CLEAN_SEA: 6.0}
+"""Runs of a cell, or of each of a kind, for one run of each size, where it is not one."""
 HULL_ERROR = 0.1
 """By how much each coefficient of the profile's hull is off, either way."""
 NOISE = (0.6, 1.6)
@@ -47,6 +50,19 @@ WRONG_BASE = 0.4
 CLEAN = ("ferry", "ferry", "workboat", "ferry", "ferry", "surveyor")
 """Vessels of clean logs, which take turns; mostly that of the detection curves, as they calibrate the oracle."""
 SPANS = ("later", "until", "while")
+SEA_LOGS, SEA_PATH = 10, "short"
+"""Logs of a campaign at sea, each a part of such a path."""
+SEA_WIND = (1.0, 3.0)
+"""Mean of the wind there [m/s], where it is not what is concealed."""
+UNSTEADY, UNSTEADY_S = 0.25, 20.0
+"""Standard deviation of that wind as a share of its mean, and for how long it is correlated [s]."""
+NOT_AT_SEA = ("fouling", "hull_parameters", "external_push")
+"""What is not concealed there: without a hull model there is none that could be wrong or fouled all along, and a push is no
+matter of a campaign."""
+ABOARD_FROM = 4
+"""The log from which on a load is aboard: one that is in all logs is the hull's own mass."""
+SEEN_WITH_WIND = ("gusts", "time_delay", "clock_offset", "held_samples")
+"""What is in every log at sea: an unsteady wind, a receiver that lags, and repeated samples."""
 
 
 @dataclass(frozen=True)
@@ -89,6 +105,10 @@ def cells() -> list[Cell]:
             Cell(f"{kind}: {name}", kind, f"{name}, {_TITLES[kind]}", _under(kind, effects[name])) for name in names
         ]
     every += [Cell(name, "outside", one.title, _outside(name)) for name, one in OUT_OF_LIBRARY.items()]
+    every.append(Cell(CLEAN_SEA, "sea", "nothing but the wind", _at_sea(None)))
+    every += [
+        Cell(f"sea: {name}", "sea", name, _at_sea(one)) for name, one in effects.items() if name not in NOT_AT_SEA
+    ]
     return every
 
 
@@ -129,7 +149,7 @@ def sample_cases(seed: int, runs: float, only: Sequence[str] = ()) -> list[Case]
     for cell in every:
         if only and not {cell.name, cell.kind} & set(only):
             continue
-        count = LEVELS * runs if cell.kind == "single" else TIMES.get(cell.kind, 1.0) * runs
+        count = LEVELS * runs if cell.kind == "single" else TIMES.get(cell.name, TIMES.get(cell.kind, 1.0)) * runs
         for number in range(max(1, round(count))):
             made.append(cell.draw(number, np.random.default_rng([seed, crc32(cell.name.encode()), number])))
     return [replace(case, format=FORMATS[place % len(FORMATS)]) for place, case in enumerate(numbered(made, seed))]
@@ -280,6 +300,40 @@ def _outside(name: str) -> Callable[[int, np.random.Generator], Case]:
             allowed=one.allowed,
             omitted_terms=one.omitted_terms,
             thruster_shift=one.thruster_shift,
+        )
+
+    return draw
+
+
+def _at_sea(effect: PlantEffect | None) -> Callable[[int, np.random.Generator], Case]:
+    """Return what draws campaigns of `ferryid.validation.sea`; the wind is always among what is in their logs."""
+
+    def draw(number: int, rng: np.random.Generator) -> Case:
+        vessel = VESSELS["ferry" if effect is None else effect.vessel]
+        north, east = random_vector(float(rng.uniform(*SEA_WIND)), rng)
+        injected, size = (Injection({}, ()), 0.0) if effect is None else _moderate(effect, vessel, rng)
+        north, east = injected.conditions.get("wind", (north, east))
+        weather = {
+            "wind": (north, east),
+            "gust_std": UNSTEADY * float(np.hypot(north, east)),
+            "gust_time": UNSTEADY_S,
+        }
+        wind = Truth("wind", None, {"north": north, "east": east})
+        truths = injected.truths if any(one.effect == "wind" for one in injected.truths) else (*injected.truths, wind)
+        blown = Injection({**weather, **injected.conditions}, truths, injected.hull_factors)
+        name = CLEAN_SEA if effect is None else f"sea: {effect.id}"
+        later = ABOARD_FROM if effect is not None and effect.id == "payload" else 0
+        return _case(
+            name,
+            "sea",
+            vessel.name,
+            rng,
+            blown,
+            path=SEA_PATH,
+            allowed=SEEN_WITH_WIND,
+            size=size,
+            logs=SEA_LOGS,
+            first_log=later,
         )
 
     return draw

@@ -99,8 +99,9 @@ def estimate_errors(
         named = named_findings(result)
         for truth in result.truths:
             if truth.key in named:
-                values = result.realised.get(truth.effect, truth.values)
-                found.setdefault(truth.effect, []).append(_errors(truth, known[truth.effect], values, named[truth.key]))
+                one = named[truth.key]
+                errors = _errors(truth, known[truth.effect], result.values(truth, one), one)
+                found.setdefault(truth.effect, []).append(errors)
     every = [one for some in found.values() for one in some]
     return (_joined("all", every), *(_joined(effect, found[effect]) for effect in sorted(found)))
 

@@ -8,7 +8,7 @@ from typing import Any
 from ferryid.validation.case import Truth
 from ferryid.validation.case_sampling import sample_cases
 from ferryid.validation.interfaces import Evaluator, Pipeline, Trial
-from ferryid.validation.log_generation import generate, realised_parameters
+from ferryid.validation.log_generation import generate, profile_with_hull, realised_parameters
 from ferryid.validation.plant.effects import plant_effects
 from ferryid.validation.records import RIVALS, CaseResult, OracleResult, RivalDiagnoses, TransferResult
 from ferryid.vessel.profile import Profile
@@ -36,6 +36,8 @@ def evaluate_oracle(trial: Trial) -> OracleResult | None:
     from ferryid.validation.oracle import oracle, oracle_of_each
     from ferryid.vessel import load_profile
 
+    if trial.more:
+        return _oracle_of_campaign(trial)
     profile = load_profile(trial.profile)
     if trial.case.kind == "clean":
         return oracle_of_each(str(trial.log), profile, _every_effect(profile))
@@ -44,12 +46,25 @@ def evaluate_oracle(trial: Trial) -> OracleResult | None:
     return oracle(str(trial.log), profile, trial.case.truths)
 
 
+def _oracle_of_campaign(trial: Trial) -> OracleResult:
+    """Return the oracle's estimates in a campaign: it is given the hull model that the diagnosis has to find."""
+    from ferryid.validation.campaign_oracle import campaign_oracle
+    from ferryid.vessel import load_profile
+
+    path = trial.folder / "vessel.toml"
+    path.write_text(profile_with_hull(trial.case), encoding="utf-8")
+    logs = [str(log) for log in (trial.log, *trial.more)]
+    return campaign_oracle(logs, load_profile(path), trial.case.truths, trial.case.first_log)
+
+
 def evaluate_transfer(trial: Trial) -> TransferResult | None:
     """Return the scores of the diagnosed model, and in one case of `RIVALS_EVERY` of the rivals, on a transfer log."""
     from ferryid.validation import rivals as learners
     from ferryid.validation.transfer_test import transfer_test
     from ferryid.vessel import load_profile
 
+    if trial.more:
+        return None
     rivals = learners.RIVALS if int(trial.case.name) % RIVALS_EVERY == 0 else {}
     if trial.model is None and not rivals:
         # Where nothing was found, nothing is claimed.
@@ -64,7 +79,7 @@ def evaluate_rivals(trial: Trial) -> RivalDiagnoses | None:
     from ferryid.validation.rivals.naming import diagnoses
     from ferryid.vessel import load_profile
 
-    if int(trial.case.name) % RIVALS_EVERY:
+    if trial.more or int(trial.case.name) % RIVALS_EVERY:
         return None
     return diagnoses(str(trial.log), load_profile(trial.profile), trial.folder / "rivals")
 

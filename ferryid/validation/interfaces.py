@@ -47,6 +47,8 @@ class Trial:
         The model that it wrote, None where it wrote none.
     folder
         Where an evaluator may write; it is kept until the run ends.
+    more
+        Further logs, which are a campaign with the first.
     """
 
     case: Case
@@ -55,6 +57,7 @@ class Trial:
     diagnosis: Diagnosis
     model: Path | None
     folder: Path
+    more: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -6,13 +6,15 @@ from collections.abc import Mapping, Sequence
 from math import isfinite, isinf
 from typing import Any
 
+from ferryid.counts import counted
 from ferryid.report.validation_figures import Detected, confusion_matrix, detection_curves
 from ferryid.types import AXES
-from ferryid.validation.case_sampling import KINDS, cells
-from ferryid.validation.page_parts import BEYOND, answers, error_figure, few, percent, render
+from ferryid.validation.case_sampling import KINDS, SEA_LOGS, cells
+from ferryid.validation.page_parts import BEYOND, answers, error_figure, error_row, few, percent, render
 from ferryid.validation.plant.effects import plant_effects
 from ferryid.validation.plant.vessels import VESSELS
 from ferryid.validation.scores import CLEAN, Detection, Scores
+from ferryid.validation.sea_scores import SeaScores
 from ferryid.validation.targets import MOST_RATIO, targets
 from ferryid.validation.transfer_scores import Claim, Method
 
@@ -29,6 +31,7 @@ HEADINGS: Mapping[str, str] = {
     "wrong base": "A base model with masses and damping at 40 %",
     "outside": "Out of the library",
 }
+"""Of the kinds of cells in the table of names; campaigns at sea have a section of their own."""
 
 
 def figures(scores: Scores) -> dict[str, str]:
@@ -37,7 +40,7 @@ def figures(scores: Scores) -> dict[str, str]:
     place = _places()
     ordered = sorted(zip(scores.confusion.rows, scores.confusion.counts, strict=True), key=lambda row: place[row[0]])
     rows, counts = [row for row, _ in ordered], [count for _, count in ordered]
-    drawn = {"confusion.svg": confusion_matrix(rows, scores.confusion.columns, counts)}
+    drawn = {"confusion.svg": confusion_matrix(rows, scores.confusion.columns, counts)} if rows else {}
     if scores.detections:
         drawn["detection.svg"] = detection_curves([_detected(one) for one in _ordered(scores.detections)])
     return drawn | error_figure(scores.recoveries)
@@ -61,6 +64,7 @@ def page(result: Mapping[str, Any], scores: Scores) -> str:
         "claims": [_claim(one) for one in scores.claims],
         "axes": AXES,
         "methods": [_method(one) for one in scores.methods],
+        "sea": None if scores.sea is None else _sea(scores.sea),
     }
     return render("validation.md", result, scores.seconds, targets(scores), scores.recoveries, context)
 
@@ -105,6 +109,33 @@ def _detection(one: Detection) -> tuple[str, ...]:
             note = f"**more than {MOST_RATIO}**: {note}"
     oracle = "" if one.oracle is None else one.oracle.text
     return one.cell, plant_effects()[one.cell].unit, one.blind.text, oracle, ratio, note
+
+
+def _sea(scores: SeaScores) -> dict[str, Any]:
+    every = sorted(scores.campaigns, key=lambda one: (one.effect != "", one.effect))
+    units = {name: one.unit for name, one in plant_effects().items()}
+    rows = [
+        (
+            one.effect or "nothing but the wind",
+            f"{one.size:.3g} {units[one.effect]}" if one.effect else "",
+            f"{one.seen:.1f}" if one.effect else "",
+            {True: "yes", False: "no"}[one.named] if one.effect else "",
+            f"{one.wind_seen:.1f}",
+            {True: "yes", False: "no"}[one.wind_named],
+            ", ".join(one.wrong),
+        )
+        for one in every
+    ]
+    first, *others = scores.recoveries
+    return {
+        "scores": scores,
+        "rows": rows,
+        "campaigns": counted(len(rows), "campaign"),
+        "logs": SEA_LOGS,
+        "every": first,
+        "median_error": percent(first.median_error),
+        "errors": [error_row(one) for one in others],
+    }
 
 
 def _claim(one: Claim) -> tuple[Any, ...]:

@@ -91,7 +91,7 @@ def wind_areas(vessel: Vessel) -> WindAreas:
 
 def profile_text(
     vessel: Vessel,
-    factors: Mapping[str, float],
+    factors: Mapping[str, float] | None,
     thrusters: tuple[Thruster, ...],
     omitted: tuple[str, ...] = (),
 ) -> str:
@@ -102,16 +102,12 @@ def profile_text(
     vessel
         The true one.
     factors
-        What coefficients of the hull are multiplied by, by name.
+        What coefficients of the hull are multiplied by, by name; None for a profile without a hull model.
     thrusters
         As the profile has them.
     omitted
         Coefficients that the profile lacks.
     """
-    M, D = (
-        {name: value * factors.get(name, 1.0) for name, value in some.items()}
-        for some in (masses(vessel), damping(vessel))
-    )
     areas = wind_areas(vessel)
     lines = [
         'schema = "ferryid.vessel/1"',
@@ -125,10 +121,7 @@ def profile_text(
         f"mass_kg = {vessel.mass}",
         f"inertia_z = {vessel.mass * (vessel.k_zz**2 + vessel.x_g**2):.6g}",
         f"x_g_m = {vessel.x_g}",
-        "[hull.M]",
-        *(f"{name} = {value:.8g}" for name, value in M.items()),
-        "[hull.D]",
-        *(f'"{name}" = {value:.8g}' for name, value in D.items() if name not in omitted),
+        *([] if factors is None else _hull_model(vessel, factors, omitted)),
         "[wind]",
         f"frontal_m2 = {areas.frontal_m2:.6g}",
         f"lateral_m2 = {areas.lateral_m2:.6g}",
@@ -144,6 +137,19 @@ def profile_text(
     for one in vessel.thrusters:
         lines += _signals(one)
     return "\n".join(lines) + "\n"
+
+
+def _hull_model(vessel: Vessel, factors: Mapping[str, float], omitted: tuple[str, ...]) -> list[str]:
+    M, D = (
+        {name: value * factors.get(name, 1.0) for name, value in some.items()}
+        for some in (masses(vessel), damping(vessel))
+    )
+    return [
+        "[hull.M]",
+        *(f"{name} = {value:.8g}" for name, value in M.items()),
+        "[hull.D]",
+        *(f'"{name}" = {value:.8g}' for name, value in D.items() if name not in omitted),
+    ]
 
 
 def _thruster(one: Thruster) -> list[str]:

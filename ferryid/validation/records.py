@@ -39,6 +39,8 @@ class Finding(Record):
         As in ``ferryid.diagnosis/1``.
     onset, offset
         When it began and ended [s], None where it acted from the start, or to the end.
+    log
+        Number of the log of a campaign that it is of.
     """
 
     effect: str
@@ -50,6 +52,7 @@ class Finding(Record):
     rivals: tuple[RivalEffect, ...] = ()
     onset: float | None = None
     offset: float | None = None
+    log: int = 0
 
     @property
     def key(self) -> Key:
@@ -246,7 +249,8 @@ class CaseResult:
     Attributes
     ----------
     case, realised
-        The answer: what was drawn, and parameters by effect that were measured in the simulated trial.
+        The answer: what was drawn, and parameters that were measured in the simulated trial, by effect; in a campaign also by
+        effect and number of the log, such as ``wind 3``.
     diagnosis
         The blind diagnosis.
     evaluations
@@ -262,6 +266,11 @@ class CaseResult:
     def truths(self) -> tuple[Truth, ...]:
         """What is in the log."""
         return self.case.truths
+
+    def values(self, truth: Truth, finding: Finding) -> Mapping[str, float]:
+        """Return the true parameters of an effect, in a campaign those of the log that a finding is of."""
+        found = self.realised.get(f"{truth.effect} {finding.log}", self.realised.get(truth.effect))
+        return truth.values if found is None else found
 
     @property
     def oracle(self) -> OracleResult | None:

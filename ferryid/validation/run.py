@@ -227,7 +227,8 @@ def _damaged(path: Path) -> FerryIdError:
 def _trial(path: Path, case: Case, job: LogJob, diagnosis: Diagnosis) -> Trial:
     model = None if diagnosis.model is None else job.out / diagnosis.model
     folder = path / "transfer" / case.name
-    return Trial(case, job.folder / job.log, job.folder / job.profile, diagnosis, model, folder)
+    more = tuple(job.folder / name for name in job.more)
+    return Trial(case, job.folder / job.log, job.folder / job.profile, diagnosis, model, folder, more)
 
 
 def _counts(diagnoses: Any) -> dict[str, int]:
@@ -250,7 +251,9 @@ def render_summary(result: Mapping[str, Any]) -> str:
 
 
 def _outcome(target: Mapping[str, Any]) -> str:
-    """Return whether a target was reached; it is open where the value does, and its interval allows either."""
+    """Return whether a target was reached; it is open where the interval of its value allows either."""
     if not target.get("tested", True):
         return "not tested"
-    return {True: "reached", False: "MISSED", None: "open"}[target["reached"]]
+    if target["reached"] is None or not target["sure"]:
+        return "open"
+    return "reached" if target["reached"] else "MISSED"

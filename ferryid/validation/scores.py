@@ -27,6 +27,7 @@ from ferryid.validation.name_scores import (
 from ferryid.validation.oracle_calibration import calibrated_thresholds
 from ferryid.validation.records import CaseResult, OracleEstimate
 from ferryid.validation.rival_scores import RivalScores, as_it_is, rival_scores
+from ferryid.validation.sea_scores import SEA, SeaScores, sea_scores
 from ferryid.validation.transfer_scores import Claim, Method, claims, failed_rivals, methods
 
 CLEAN = "clean"
@@ -109,11 +110,13 @@ class Scores(Record):
     thresholds
         Of the oracle, by effect, at least its floor, from clean logs [nats].
     seconds
-        Of the median diagnosis, and of the slowest.
+        Of the median diagnosis, and of the slowest; campaigns count only where there is nothing else.
     oracle_seconds
         The same of the oracle.
     rivals
         The diagnosis beside other methods, on the cases on which these were run.
+    sea
+        Of the campaigns at sea, which no other figure counts; None where there are none.
     """
 
     runs: int
@@ -133,10 +136,12 @@ class Scores(Record):
     seconds: tuple[float, float]
     oracle_seconds: tuple[float, float]
     rivals: tuple[RivalScores, ...] = ()
+    sea: SeaScores | None = None
 
 
-def score(results: Sequence[CaseResult]) -> Scores:
+def score(every: Sequence[CaseResult]) -> Scores:
     """Return the figures of merit of finished cases."""
+    results = [result for result in every if result.case.kind != SEA]
     clean = [result for result in results if result.case.kind == CLEAN and not result.truths]
     thresholds = calibrated_thresholds(one for result in clean for one in _estimates(result))
     found = detections(results, thresholds)
@@ -157,9 +162,11 @@ def score(results: Sequence[CaseResult]) -> Scores:
         found,
         float(np.median(ratios)) if ratios else nan,
         thresholds,
-        _median_and_most([result.diagnosis.seconds for result in results]),
+        # Of campaigns where there is nothing else.
+        _median_and_most([result.diagnosis.seconds for result in results or every]),
         _median_and_most([one.seconds for one in oracles]),
         rival_scores(results, as_it_is),
+        sea_scores([result for result in every if result.case.kind == SEA]),
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from ferryid.json_record import Record
 from ferryid.validation.name_scores import Share
 from ferryid.validation.scores import CLEAN, Scores
+from ferryid.validation.sea_scores import SeaScores
 
 MOST_RATIO = 1.5
 """Ratio of the sizes named reliably, the diagnosis's over the oracle's, that is allowed."""
@@ -14,6 +15,8 @@ COVERED = (0.93, 0.97)
 """Share of 95 % intervals that is to hold the truth."""
 FALSE = 0.01
 """Share of logs that may have a wrong name."""
+AT_SEA = 0.95
+"""Share of the effects that change a campaign at sea twice as much as an oracle just sees, or more, which is to be named."""
 IN_TIME = 0.9
 """Share of onsets and offsets that is to be within 5 s."""
 
@@ -71,6 +74,24 @@ def targets(scores: Scores) -> list[Target]:
         Target(f"{sizes}: {len(near)} of {tested} effects", len(near) == tested, True)
         if tested
         else Target(sizes, None, False, tested=False),
+        *_at_sea(scores.sea),
+    ]
+
+
+def _at_sea(sea: SeaScores | None) -> list[Target]:
+    named, false, covered = (Share(0, 0),) * 3
+    if sea is not None:
+        named, false, covered = sea.named_from_twice, sea.false, sea.recoveries[0].covered
+    return [
+        share_target(
+            f"at sea, effects named from twice what the oracle sees on: at least {100.0 * AT_SEA:.0f} %",
+            named,
+            at_least=AT_SEA,
+        ),
+        share_target("at sea, campaigns with a wrong name: at most 1 %", false, at_most=FALSE),
+        share_target(
+            "at sea, 95 % intervals that hold the truth: 93 to 97 %", covered, at_least=COVERED[0], at_most=COVERED[1]
+        ),
     ]
 
 

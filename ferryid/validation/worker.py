@@ -76,9 +76,9 @@ def diagnose_log(log: Path, profile: Path, out: Path, more: Sequence[Path] = ())
 def _campaign(every: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Return the diagnoses of a campaign as one: the findings that most logs have, each from the log of middle probability."""
     found: dict[tuple[str, str | None], list[dict[str, Any]]] = {}
-    for one in every:
+    for number, one in enumerate(every):
         for finding in one["findings"]:
-            found.setdefault((finding["effect"], finding["instance"]), []).append(finding)
+            found.setdefault((finding["effect"], finding["instance"]), []).append(finding | {"log": number})
     shared = [
         sorted(some, key=lambda finding: finding["probability"])[len(some) // 2]
         for some in found.values()
@@ -96,6 +96,7 @@ def _finding(one: Mapping[str, Any]) -> dict[str, Any]:
         "rivals": one["rivals"][:RIVALS],
         "onset": where["onset"],
         "offset": where["offset"],
+        "log": one.get("log", 0),
     }
 
 

@@ -67,14 +67,14 @@ def test_the_page_has_commitment_sizes_and_what_was_missed() -> None:
 def test_a_target_without_data_is_not_tested() -> None:
     clean = score([result([], [], "clean", "clean")])
     every = targets(clean)
-    assert [one.tested for one in every] == [True, True, False, False, False]
-    assert [one.reached for one in every if not one.tested] == [None, None, None]
+    assert [one.tested for one in every] == [True, True, False, False, False, False, False, False]
+    assert {one.reached for one in every if not one.tested} == {None}
     text = page(RESULT, clean)
     for what in ("95 % intervals that hold the truth", "onsets and offsets within 5 s", "sizes named 19 times in 20"):
         (row,) = (line for line in text.splitlines() if line.startswith(f"| {what}"))
         assert row.endswith("| not tested |")
     summary = render_summary({**RESULT, "targets": [one.to_json() for one in every]})
-    assert summary.count("not tested") == 3
+    assert summary.count("not tested") == 6
     # Nor are figures linked that there are not.
     assert "detection.svg" not in text
     assert "errors.svg" not in text
@@ -101,3 +101,24 @@ def test_the_figures_are_drawings_of_what_there_is() -> None:
     for text in drawn.values():
         assert ElementTree.fromstring(text).tag.endswith("svg")
     assert set(figures(score([result([], [], "clean", "clean")]))) == {"confusion.svg"}
+
+
+def test_campaigns_at_sea_have_a_section_of_their_own() -> None:
+    from tests.validation.test_sea import DRAG, found
+    from tests.validation.test_sea import WIND as OF_THE_DAY
+    from tests.validation.test_sea import result as campaign
+
+    every = [
+        campaign((DRAG, OF_THE_DAY), [found("current", 0, north=0.1, east=0.0)], {"current": 99.0}, 0.1),
+        campaign((OF_THE_DAY,), [], {}, 0.0),
+    ]
+    text = page(RESULT, score(every))
+    assert "## At sea" in text
+    assert "and 2 campaigns of 10 logs." in text
+    (row,) = (line for line in text.splitlines() if line.startswith("| current | 0.1 m/s |"))
+    assert row.endswith("| yes | 0.0 | no |  |")
+    assert "| at sea, campaigns with a wrong name: at most 1 %; 0.0 % (0/2)" in text
+    # No trial: no table of names.
+    assert "## Names by cell" not in text
+    assert "confusion.svg" not in text
+    assert "## At sea" not in page(RESULT, score([result([], [], "clean", "clean")]))

@@ -4,8 +4,9 @@ A condition such as a wind is confirmed where logs that have one of their own ar
 out, by an interval that excludes zero, where the evidence speaks for it as it must for any effect, and where both speak for it
 against the same condition on headings that the vessel did not have. A condition and its placebo have as many parameters each,
 so that the difference of their evidence is the logarithm of their odds; it is divided as variances are widened elsewhere. What
-a placebo explains as well may be a hull that is guessed from the same logs, and must then be the smaller part. What is not
-confirmed may still be estimated: it is reported as such.
+a placebo explains as well may be a hull that is guessed from the same logs, and must then be the smaller part, or hardly more
+than it imitates of a condition that acts: on few headings, as in logs of a minute, that may be half. What is not confirmed
+may still be estimated: it is reported as such.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from ferryid.diagnose.judging.campaign_evidence import (
     Gain,
     HeldOutLoss,
     held_out_loss,
+    likeness,
     placebos,
     with_conditions,
     without_conditions,
@@ -59,16 +61,22 @@ class PlaceboTest:
     share
         Of the condition's evidence over none, what the placebo has too: where a hull that is guessed from the same logs is off,
         both gain by that. A hull that is known leaves no such part, and it is zero.
+    likeness
+        What the share would be if the condition were what acts: see `likeness`.
     """
 
     gain: Gain
     evidence: float
     share: float
+    likeness: float = 0.0
 
     @property
     def own(self) -> bool:
-        """True where most of what the condition explains is its own."""
-        return self.share <= JUDGING.placebo_part
+        """True where most of what the condition explains is its own, or all but a little of what a placebo cannot imitate."""
+        most = JUDGING.placebo_part
+        if self.likeness <= JUDGING.placebo_likeness:
+            most = max(most, self.likeness + JUDGING.placebo_excess * (1.0 - self.likeness))
+        return self.share <= most
 
     @property
     def beaten(self) -> bool:
@@ -257,8 +265,10 @@ def _tested(campaign: Campaign, progress: Callable[[str], None]) -> ConditionTes
         for name, placebo in placebos(campaign).items():
             other = estimate_campaign(placebo, noise=made.noise)
             over = gains - held_out_loss(other).gain(loss[0])
-            share = 0.0 if campaign.hull.known else (other.evidence - none.evidence) / evidence
-            against[name] = PlaceboTest(Gain.of(over), made.evidence - other.evidence, share)
+            share, like = 0.0, 0.0
+            if not campaign.hull.known:
+                share, like = (other.evidence - none.evidence) / evidence, likeness(made, none, other)
+            against[name] = PlaceboTest(Gain.of(over), made.evidence - other.evidence, share, like)
     return ConditionTest(campaign.conditions[0].effect.id, made, none, loss, evidence, Gain.of(gains), against)
 
 

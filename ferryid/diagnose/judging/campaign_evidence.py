@@ -105,6 +105,39 @@ def held_out_blocks(windows: Windows) -> Iterator[tuple[slice, slice]]:
             yield slice(begin, stop), slice(max(first, begin - purge), min(end, stop + purge))
 
 
+def likeness(made: CampaignFit, none: CampaignFit, other: CampaignFit) -> float:
+    """Return the share of what a condition explains that another would explain too, if the condition is what acts.
+
+    What the condition changes in the gaps, and nothing else, takes the place of the logs; hull and steady forces take up what
+    they can of it, and either condition what it can beside them.
+
+    Parameters
+    ----------
+    made, none, other
+        The logs with the condition, without it, and with the other in its place, under one noise.
+    """
+    campaign, count = made.campaign, len(made.campaign.own)
+    signals = []
+    for i, own in enumerate(made.own):
+        still = own.copy()
+        still[:count] = -made.common[campaign.means]
+        change = campaign.gap(i, made.common, own) - campaign.gap(i, made.common, still)
+        signals.append(made.noise.white(i, change, campaign.members[i].windows.runs))
+    alone, itself, instead = (_left(one, signals) for one in (none, made, other))
+    return (alone - instead) / max(alone - itself, 1e-12)
+
+
+def _left(fit: CampaignFit, signals: Sequence[Floats]) -> float:
+    """Return what is left of whitened changes of the gaps, shape (J, 3) of each log, with what departs for it, squared."""
+    parts = tuple(replace(part, gaps=one) for part, one in zip(fit.parts, signals, strict=True))
+    begun = replace(fit, common=np.zeros_like(fit.common), own=np.zeros_like(fit.own), parts=parts)
+    step, own = begun.normal.step(begun.common)
+    left = float(step @ step) + float(np.sum(own**2 * fit.campaign.own_precision(fit.spreads)))
+    for part, mine in zip(parts, own, strict=True):
+        left += float(np.sum((part.gaps + part.slopes @ np.concatenate([step, mine])) ** 2))
+    return left
+
+
 def placebos(campaign: Campaign) -> dict[str, Campaign]:
     """Return the campaign with conditions that cannot be true: on the mirrored heading, and on that of another log.
 

@@ -153,6 +153,18 @@ class JudgingThresholds:
         "most that a placebo may have too",
         "convention: half; after a wind was confirmed in a towing tank whose placebo explained four fifths of it",
     )
+    placebo_excess: float = threshold(
+        0.25,
+        "of what a placebo cannot imitate",
+        "most that a placebo may have besides what it imitates of a condition that acts",
+        "convention: a quarter, where a true condition leaves nothing, and a guessed hull that is off as much as for itself",
+    )
+    placebo_likeness: float = threshold(
+        0.67,
+        "of what a condition explains",
+        "most that a placebo may imitate for that to count",
+        "convention: two thirds; a wind in a towing tank, which was none, had a placebo that imitates 85 % of it",
+    )
     placebo_turn: float = threshold(
         30.0,
         "deg",

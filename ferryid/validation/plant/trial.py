@@ -154,6 +154,25 @@ def simulate_trial(vessel: Vessel, conditions: Conditions, path: str, seed: int)
     return Trial(plant, t, log.reported, log.states, log.orders, log.wanted, loads, log.thrust)
 
 
+def instrument_motion(states: Floats) -> tuple[Floats, Floats]:
+    """Return where the instruments are and how they move over ground, by sample.
+
+    Parameters
+    ----------
+    states
+        As in `Trial`, shape (n, 12 + 6 k).
+
+    Returns
+    -------
+    tuple
+        North, east [m] and heading [rad], and their rates [m/s, rad/s], shape (n, 3) each.
+    """
+    pose, rates = np.zeros((len(states), 3)), np.zeros((len(states), 3))
+    for row, state in enumerate(states):
+        _kinematics(state, pose[row], rates[row])
+    return pose, rates
+
+
 @compiled
 def _measure(setup: _Setup, memory: _Memory, log: _Log, row: int) -> None:
     """Write the states of a sample and what an unbiased navigation reports of them."""

@@ -17,8 +17,15 @@ from ferryid.diagnose.inference.campaign_model import INDUCED, Campaign, HullPri
 from ferryid.diagnose.inference.estimation import Candidate, estimation_problem, fit
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging import campaign_conditions
-from ferryid.diagnose.judging.campaign_conditions import ConditionTest, judge_conditions, note
-from ferryid.diagnose.judging.campaign_evidence import EXCHANGED, MIRRORED, placebos, without_conditions
+from ferryid.diagnose.judging.campaign_conditions import ConditionTest, PlaceboTest, judge_conditions, note
+from ferryid.diagnose.judging.campaign_evidence import (
+    EXCHANGED,
+    MIRRORED,
+    Gain,
+    likeness,
+    placebos,
+    without_conditions,
+)
 from ferryid.effects import effects
 from ferryid.effects.force_model import ForceModel, hull_of
 from ferryid.types import Floats, no_progress
@@ -145,6 +152,25 @@ def test_one_log_more_changes_nothing_where_it_says_nothing() -> None:
     assert (moved <= 0.5 * known).all()
     value, covariance = made.condition(3, 0)
     assert (np.abs(value - WINDS[0]) < 3.0 * np.sqrt(np.diag(covariance))).all()
+
+
+def test_what_a_placebo_imitates_of_a_wind_that_blew_is_what_it_explains() -> None:
+    made = fitted()
+    none = estimate_campaign(without_conditions(campaign()), noise=made.noise)
+    assert likeness(made, none, none) == pytest.approx(0.0, abs=1e-9)
+    assert likeness(made, none, made) == pytest.approx(1.0)
+    for placebo in placebos(campaign()).values():
+        other = estimate_campaign(placebo, noise=made.noise)
+        share = (other.evidence - none.evidence) / (made.evidence - none.evidence)
+        assert likeness(made, none, other) == pytest.approx(share, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("share", "imitated", "own"),
+    [(0.5, 0.0, True), (0.55, 0.0, False), (0.6, 0.5, True), (0.65, 0.5, False), (0.76, 0.85, False)],
+)
+def test_a_placebo_may_have_half_or_little_more_than_it_imitates(share: float, imitated: float, own: bool) -> None:
+    assert PlaceboTest(Gain(1.0, 0.5, 1.5), 99.0, share, imitated).own is own
 
 
 def test_winds_are_confirmed_over_all_logs_and_a_current_is_not() -> None:

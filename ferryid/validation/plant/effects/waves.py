@@ -64,7 +64,7 @@ def realised(trial: Trial, conditions: Conditions) -> Mapping[str, float]:
     if conditions["wave_height"] == 0.0:
         return {}
     X, Y, N = trial.loads["waves"][:, [0, 1, 5]].T
-    frequency, power = welch(N, RATE_HZ, nperseg=4096)
+    frequency, power = welch(N, RATE_HZ, nperseg=min(4096, len(N)))
     return {
         "peak_frequency": float((frequency * power).sum() / power.sum()),
         "force_std": float(np.sqrt(0.5 * (X.var() + Y.var()))),
