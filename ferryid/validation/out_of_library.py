@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.validation.plant.vessels import Vessel
-from ferryid.validation.prior_profile import SURGE, SWAY, YAW
+from ferryid.validation.prior_profile import SURGE, SWAY, YAW, damping
 
 
 @dataclass(frozen=True)
@@ -73,11 +73,19 @@ def _wakes(vessel: Vessel, duration_s: float, rng: np.random.Generator) -> dict[
     }
 
 
+def _hump(vessel: Vessel, duration_s: float, rng: np.random.Generator) -> dict[str, Any]:
+    speed = float(rng.uniform(0.4, 0.7)) * vessel.speed_mps
+    coefficients = damping(vessel)
+    drag = coefficients["X_u"] * speed + coefficients["X_|u|u"] * speed**2
+    return {"hump": (speed, 0.12 * vessel.speed_mps, float(rng.uniform(0.5, 1.0)) * abs(drag))}
+
+
 OUT_OF_LIBRARY: Mapping[str, OutOfLibrary] = {
     "squall": OutOfLibrary("a wind of a few minutes", _squall, ("wind", "gusts")),
     "veering wind": OutOfLibrary("a wind that turns by half a circle", _veering, ("wind", "gusts")),
     "turning current": OutOfLibrary("a current that turns right round", _turning_current, ("current",)),
     "boat wakes": OutOfLibrary("wakes of four passing boats", _wakes, ("waves", "gusts")),
+    "resistance hump": OutOfLibrary("a hump of resistance at one speed", _hump, ("fouling",)),
     "no cross damping": OutOfLibrary(
         "a model whose sway and yaw do not damp each other",
         _nothing,

@@ -16,6 +16,7 @@ from typing import Any
 
 from ferryid.counts import counted
 from ferryid.files import write_text
+from ferryid.validation.case_sampling import SEA_LOGS
 from ferryid.validation.name_scores import Share
 from ferryid.validation.page import page
 from ferryid.validation.page_parts import command, few
@@ -104,10 +105,17 @@ class Half:
         whole = Share(sum(one.count for one in every), sum(one.of for one in every))
         twice = [_from_twice(one) for one in scores.detections]
         far = Share(sum(one.count for one in twice), sum(one.of for one in twice))
+        many = right = wrong = ""
+        if scores.sea is not None:
+            many = (
+                f", and {counted(len(scores.sea.campaigns), 'campaign')} of {SEA_LOGS} logs that look like those at sea"
+            )
+            right = f"; at sea {scores.sea.named_from_twice.text} from twice what the oracle sees on"
+            wrong = f"; at sea in {scores.sea.false.text}"
         said = (
-            f"{counted(scores.runs, 'trial')}, {clean} of them without an effect",
-            f"{whole.text} of all sizes, invisible ones among them; {far.text} from twice the oracle's size on",
-            f"a name that is not in the trial in {scores.false_names['all'].text}",
+            f"{counted(scores.runs, 'trial')}, {clean} of them without an effect{many}",
+            f"{whole.text} of all sizes, invisible ones among them; {far.text} from twice the oracle's size on{right}",
+            f"a name that is not in the trial in {scores.false_names['all'].text}{wrong}",
             ON_TRIALS,
             _sources(result),
         )

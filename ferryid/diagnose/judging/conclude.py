@@ -148,10 +148,14 @@ def _too_short(
     figures = replace(shared, joint=baseline.joint, baseline_sensors=baseline.sensors, setting=setting)
     findings, notes = apply_rules(claims, figures)
     profile, window_s = screened.measurements.profile, _window_s(log.windows.weight, log.windows.measurements.step_s)
-    short = (
-        f"Only {counted(len(log.windows.starts), 'stretch')} of {window_s:.0f} s without a gap: too few for a conclusion. "
-        f"{TEN_MINUTES.get(setting, TEN_MINUTES[''])}"
+    # Bags of seconds are welcome in a campaign, which needs no longer ones.
+    advice = (
+        TEN_MINUTES.get(setting, TEN_MINUTES[""])
+        if together is None
+        else "What all logs say together holds for it too."
     )
+    short = f"Only {counted(len(log.windows.starts), 'stretch')} of {window_s:.0f} s without a gap: too few for a conclusion "
+    short += f"from this log alone. {advice}"
     remainder = Remainder(testable=False)
     errors = None if together is None else together.errors(log.path, findings)
     before, after = ({}, {}) if errors is None else errors.scores(window_s)
