@@ -48,6 +48,8 @@ STARTS, BEARINGS = (0.25, 0.6, 1.25), 8
 """Conditions from which a search begins besides none: lengths in sizes, and directions; a wind has no slope at rest."""
 STEADY_SHARE = 0.1
 """Of the gaps, in the root mean square: spread of the steady accelerations to begin with."""
+SEARCHES, CLEARLY_BETTER = 2, 1.0
+"""Most searches for better conditions once an estimate has settled, and what they must gain for a log [nat]."""
 HALVINGS = (1.0, 0.5, 0.25, 0.1)
 SCALE_ROUNDS, SCALE_GAPS = 3, 30.0
 """Rounds in which colour and loudness of the noise are found, and how many gaps the belief counts for that all are as loud."""
@@ -248,20 +250,89 @@ def estimate_campaign(
         An estimate of the same conditions and properties, to begin with and to take the spreads from.
     """
     if begin is not None:
-        spreads, at = begin.spreads, _point(campaign, begin.common, begin.own)
-    else:
-        spreads, at = _first(campaign)
+        at = _point(campaign, begin.common, begin.own)
+        return _settled(campaign, at, begin.spreads, noise, known_spreads=True)
+    spreads, at = _first(campaign)
+    made = _settled(campaign, at, spreads, noise)
+    for _ in range(SEARCHES):
+        own = _elsewhere(made) if campaign.own else None
+        if own is None:
+            break
+        # Two estimates are compared under one noise.
+        again = _settled(campaign, _point(campaign, made.common, own), made.spreads, made.noise)
+        if again.evidence <= made.evidence:
+            break
+        made = again
+        if noise is None:
+            made = _settled(campaign, _point(campaign, made.common, made.own), made.spreads, None)
+    return made
+
+
+def _settled(
+    campaign: Campaign, at: _Point, spreads: Spreads, noise: CampaignNoise | None, *, known_spreads: bool = False
+) -> CampaignFit:
+    """Return the estimate to which Gauss-Newton steps lead, with the spreads and the noise that follow from them."""
     made = _fit(campaign, at, noise or _noise(campaign, at.gaps), spreads)
     for _ in range(ROUNDS):
         at, gained = _step(made, at)
-        if begin is None:
+        change = 0.0
+        if not known_spreads:
             spreads, change = _spreads(made, at.own)
-        else:
-            change = 0.0
         made = _fit(campaign, at, noise or _noise(campaign, at.gaps), spreads)
         if change < SETTLED and gained < CONVERGED_GAIN:
             break
     return made
+
+
+def _elsewhere(made: CampaignFit) -> Floats | None:
+    """Return the logs' own vectors, shape (L, l), with conditions that explain clearly more than where the steps have led.
+
+    The load of a wind has one slope on either side of none, so that steps may settle on the wrong one. Every log tries other
+    directions and lengths of each of its conditions, while what is common may move as far as the other logs let it. None where
+    no log finds better.
+    """
+    found = over(lambda i: _better(made, i), range(len(made.own)))
+    return (
+        None
+        if all(one is None for one in found)
+        else np.stack([mine if one is None else one for mine, one in zip(made.own, found, strict=True)])
+    )
+
+
+def _better(made: CampaignFit, i: int) -> Floats | None:
+    """Return the own vector of a log with conditions that explain clearly more than its present ones; None without such."""
+    campaign, part, g = made.campaign, made.parts[i], made.campaign.g
+    runs = campaign.members[i].windows.runs
+    own_precision = campaign.own_precision(made.spreads)
+    J, w = part.slopes.reshape(-1, part.slopes.shape[2]), part.gaps.ravel()
+    # The other logs' say in what is common; at the optimum their slopes are those of this log with the other sign.
+    others = np.eye(g) + np.sum(made.normal.matrices, axis=0) - made.normal.matrices[i]
+    H = J.T @ J
+    H[:g, :g] += others
+    H[g:, g:] += np.diag(own_precision)
+    now = float(w @ w + made.own[i] ** 2 @ own_precision)
+    best, least = None, now - 2.0 * CLEARLY_BETTER
+    for k in range(len(campaign.conditions)):
+        rows = [j for j, (of, _) in enumerate(campaign.own) if of == k]
+        mean = made.common[campaign.means][rows]
+        kept = np.ones(len(H), dtype=bool)
+        kept[[g - len(campaign.own) + j for j in rows]] = kept[[g + j for j in rows]] = False
+        factor = cho_factor(H[np.ix_(kept, kept)])
+        for start in _starts():
+            own = made.own[i].copy()
+            own[rows] = start - mean
+            left = made.noise.white(i, campaign.gap(i, made.common, own), runs).ravel()
+            slope = J.T @ (left - w)
+            cost = float(left @ left + own**2 @ own_precision - slope[kept] @ cho_solve(factor, slope[kept]))
+            if cost < least:
+                best, least = own, cost
+    return best
+
+
+def _starts() -> list[Floats]:
+    """Return conditions from which a search begins, in sizes: none, and some lengths in every direction."""
+    angles = np.arange(BEARINGS) * 2.0 * np.pi / BEARINGS
+    return [np.zeros(2), *(length * np.array([np.cos(one), np.sin(one)]) for length in STARTS for one in angles)]
 
 
 @dataclass(frozen=True)
@@ -355,10 +426,8 @@ def _started(campaign: Campaign, bare: CampaignFit, i: int, common: Floats, own:
     best, least = np.zeros(len(campaign.own)), np.inf
     for k in range(len(campaign.conditions)):
         rows = [j for j, (of, _) in enumerate(campaign.own) if of == k]
-        angles = np.arange(BEARINGS) * 2.0 * np.pi / BEARINGS
-        around = [length * np.array([np.cos(one), np.sin(one)]) for length in STARTS for one in angles]
         chosen = best.copy()
-        for start in [np.zeros(2), *around]:
+        for start in _starts():
             tried = best.copy()
             tried[rows] = start
             at = own.copy()

@@ -125,7 +125,7 @@ def _without_confirmed(
     made = conditions.hull.fit
     if not (made.campaign.conditions or made.campaign.properties):
         return None, None
-    if not made.campaign.properties:
+    if not made.campaign.properties and len(made.campaign.conditions) == 1:
         for one in conditions.tests:
             if one.fit is made:
                 return one.none, one.loss

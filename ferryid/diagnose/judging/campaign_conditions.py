@@ -32,7 +32,7 @@ from ferryid.diagnose.judging.campaign_evidence import (
     Gain,
     HeldOutLoss,
     held_out_loss,
-    likeness,
+    imitated_share,
     placebos,
     with_conditions,
     without_conditions,
@@ -44,6 +44,7 @@ from ferryid.diagnose.judging.figure_data import axis_of_errors, error_columns
 from ferryid.diagnose.judging.finding import Finding, Rival
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
+from ferryid.effects.effect import Parameter
 from ferryid.effects.wording import listed
 from ferryid.types import AXES, Floats
 
@@ -61,21 +62,21 @@ class PlaceboTest:
     share
         Of the condition's evidence over none, what the placebo has too: where a hull that is guessed from the same logs is off,
         both gain by that. A hull that is known leaves no such part, and it is zero.
-    likeness
-        What the share would be if the condition were what acts: see `likeness`.
+    imitated
+        What the share would be if the condition were what acts: see `imitated_share`.
     """
 
     gain: Gain
     evidence: float
     share: float
-    likeness: float = 0.0
+    imitated: float = 0.0
 
     @property
     def own(self) -> bool:
         """True where most of what the condition explains is its own, or all but a little of what a placebo cannot imitate."""
         most = JUDGING.placebo_part
-        if self.likeness <= JUDGING.placebo_likeness:
-            most = max(most, self.likeness + JUDGING.placebo_excess * (1.0 - self.likeness))
+        if self.imitated <= JUDGING.placebo_imitated:
+            most = max(most, self.imitated + JUDGING.placebo_excess * (1.0 - self.imitated))
         return self.share <= most
 
     @property
@@ -94,7 +95,7 @@ class ConditionTest:
     effect
         Its id.
     fit, none
-        The logs with it and without, under one noise.
+        The logs with it and without, under one noise; both with the conditions beside which it is tested.
     loss
         Of held-out blocks, without it and with it.
     evidence
@@ -119,15 +120,35 @@ class ConditionTest:
     unresolved: tuple[str, ...] = ()
     outdone: tuple[str, ...] = ()
 
+    @property
+    def place(self) -> int:
+        """Which of the conditions of `fit` it is."""
+        return [one.effect.id for one in self.fit.campaign.conditions].index(self.effect)
+
+    @property
+    def rows(self) -> list[int]:
+        """Which parameters of a log's own conditions are its."""
+        return [j for j, (of, _) in enumerate(self.fit.campaign.own) if of == self.place]
+
+    @property
+    def parameters(self) -> list[Parameter]:
+        """What every log has of it."""
+        return [self.fit.campaign.own[j][1] for j in self.rows]
+
+    @property
+    def beside(self) -> tuple[str, ...]:
+        """Other conditions that `fit` and `none` have."""
+        return tuple(one.effect.id for one in self.fit.campaign.conditions if one.effect.id != self.effect)
+
     @cached_property
     def courses(self) -> tuple[Course, ...]:
         """Of a flow that is confirmed and changes within logs, its course in each; empty of others."""
         turbulence = effects()[self.effect].turbulence
-        return estimate_courses(self.fit, 0, turbulence) if self.confirmed and turbulence is not None else ()
+        return estimate_courses(self.fit, self.place, turbulence) if self.confirmed and turbulence is not None else ()
 
     def condition(self, i: int) -> tuple[Floats, Floats]:
         """Return what a log has of it, of a flow with a course its mean, and the covariance, shapes (q,) and (q, q)."""
-        return (self.courses[i].mean, self.courses[i].covariance) if self.courses else self.fit.condition(i, 0)
+        return (self.courses[i].mean, self.courses[i].covariance) if self.courses else self.fit.condition(i, self.place)
 
     @property
     def confirmed(self) -> bool:
@@ -168,15 +189,14 @@ class ConditionTest:
         """How much of the measured acceleration of each log it is, by axis, shape (logs, 3)."""
         campaign = self.fit.campaign
         common, own = self.fit.common.copy(), self.fit.own.copy()
-        common[campaign.means], own[:, : len(campaign.own)] = 0.0, 0.0
+        common[campaign.means][self.rows], own[:, self.rows] = 0.0, 0.0
         return felt(self.fit, common, own)
 
     def value_doubt(self, i: int) -> str:
         """Return why what a log has of it is not credible, or not felt, as the end of a sentence; empty where it is."""
-        parameters = [one for _, one in self.fit.campaign.own]
-        values = dict(zip((one.name for one in parameters), self.condition(i)[0].tolist(), strict=True))
+        values = dict(zip((one.name for one in self.parameters), self.condition(i)[0].tolist(), strict=True))
         profile = self.fit.campaign.members[i].plain.measurements.profile
-        return value_doubt(effects()[self.effect], parameters, values, profile) or unfelt(self.felt[i])
+        return value_doubt(effects()[self.effect], self.parameters, values, profile) or unfelt(self.felt[i])
 
     @property
     def probability(self) -> float:
@@ -219,29 +239,43 @@ def judge_conditions(campaign: Campaign, place: Mapping[str, int], progress: Cal
     tests = []
     for name in names:
         progress(f"estimating one hull and a {effects()[name].title.lower()} of every log")
-        tests.append(_tested(with_conditions(campaign, frozenset([name])), progress))
+        tests.append(_tested(with_conditions(campaign, frozenset([name])), name, progress))
     tests = [_against_others(one, campaign, progress) if one.confirmed else one for one in tests]
     tests.sort(key=lambda one: -one.evidence)
     confirmed = [one for one in tests if one.confirmed]
     if not confirmed:
         progress("estimating one hull for all logs")
         return JudgedConditions(CommonHull(estimate_campaign(without_conditions(campaign)), place), tuple(tests))
-    # A second condition must be seen beside the first, which may have stood in for it.
     best = confirmed[0]
-    kept, fit = [best], best.fit
-    for other in confirmed[1:]:
+    kept, fit, beside = [best], best.fit, dict[str, ConditionTest]()
+    for other in [one for one in tests if one is not best]:
         both = with_conditions(campaign, frozenset(one.effect for one in (*kept, other)))
-        if (made := _beside(fit, both)) is not None:
+        if other.confirmed:
+            # It must be seen beside the first, which it may have stood in for.
+            made = _beside(fit, both)
+        else:
+            # The first may have hidden it: what a condition leaves to explain looks like another one turned round.
+            progress(f"estimating a {effects()[other.effect].title.lower()} of every log beside what is confirmed")
+            seen = _against_others(_tested(both, other.effect, progress), campaign, progress)
+            made, beside[other.effect] = (seen.fit if seen.confirmed else None), seen
+        if made is not None:
             kept, fit = [*kept, other], made
-    near = [one for one in confirmed if one not in kept and best.evidence - one.evidence < JUDGING.unresolved_evidence]
-    if near and len(kept) == 1:
+    if len(kept) > 1:
+        # What is told of each is what it is beside the others, and each must hold there.
+        together = {one.effect: _tested(fit.campaign, one.effect, progress, made=fit) for one in kept}
+        if all(one.confirmed for one in together.values()):
+            left = [one for one in tests if one.effect in together or not one.confirmed]
+            told = tuple(together.get(one.effect, beside.get(one.effect, one)) for one in left)
+            return JudgedConditions(CommonHull(fit, place), told)
+    near = [one for one in confirmed[1:] if best.evidence - one.evidence < JUDGING.unresolved_evidence]
+    if near:
         # Either is confirmed and not both: which of them acts is not known, and the hull is better without a wrong one.
         names = [best.effect, *(one.effect for one in near)]
         open_ = {name: tuple(other for other in names if other != name) for name in names}
         tests = [replace(one, unresolved=open_.get(one.effect, ())) for one in tests]
         return JudgedConditions(CommonHull(estimate_campaign(without_conditions(campaign)), place), tuple(tests))
-    left = [one for one in tests if one in kept or not one.confirmed]
-    return JudgedConditions(CommonHull(fit, place), tuple(left))
+    left = [one for one in tests if one is best or not one.confirmed]
+    return JudgedConditions(CommonHull(best.fit, place), tuple(beside.get(one.effect, one) for one in left))
 
 
 def _beside(fit: CampaignFit, both: Campaign) -> CampaignFit | None:
@@ -252,24 +286,31 @@ def _beside(fit: CampaignFit, both: Campaign) -> CampaignFit | None:
     return made if made.evidence - alone.evidence >= INFERENCE.prior_odds and gain.low > 0.0 else None
 
 
-def _tested(campaign: Campaign, progress: Callable[[str], None]) -> ConditionTest:
-    made = estimate_campaign(campaign)
-    none = estimate_campaign(without_conditions(campaign), noise=made.noise)
+def _tested(
+    campaign: Campaign, effect: str, progress: Callable[[str], None], *, made: CampaignFit | None = None
+) -> ConditionTest:
+    """Test a condition beside the others that the logs of a campaign have; `made` is the estimate with it, if there is one."""
+    made = estimate_campaign(campaign) if made is None else made
+    others = frozenset(one.effect.id for one in campaign.conditions) - {effect}
+    none = estimate_campaign(with_conditions(campaign, others), noise=made.noise)
     evidence = made.evidence - none.evidence
     loss = held_out_loss(none), held_out_loss(made)
     gains = loss[1].gain(loss[0])
-    against: dict[str, PlaceboTest] = {}
+    test = ConditionTest(effect, made, none, loss, evidence, Gain.of(gains), {})
     # What the evidence does not speak for needs no placebo to fall.
-    if evidence >= INFERENCE.prior_odds:
-        progress("estimating the same on headings that the vessel did not have")
-        for name, placebo in placebos(campaign).items():
-            other = estimate_campaign(placebo, noise=made.noise)
-            over = gains - held_out_loss(other).gain(loss[0])
-            share, like = 0.0, 0.0
-            if not campaign.hull.known:
-                share, like = (other.evidence - none.evidence) / evidence, likeness(made, none, other)
-            against[name] = PlaceboTest(Gain.of(over), made.evidence - other.evidence, share, like)
-    return ConditionTest(campaign.conditions[0].effect.id, made, none, loss, evidence, Gain.of(gains), against)
+    if evidence < INFERENCE.prior_odds:
+        return test
+    progress("estimating the same on headings that the vessel did not have")
+    against: dict[str, PlaceboTest] = {}
+    for name, placebo in placebos(campaign, effect).items():
+        other = estimate_campaign(placebo, noise=made.noise)
+        over = gains - held_out_loss(other).gain(loss[0])
+        share, like = 0.0, 0.0
+        if not campaign.hull.known:
+            share = (other.evidence - none.evidence) / evidence
+            like = imitated_share(made, none, other, test.rows)
+        against[name] = PlaceboTest(Gain.of(over), made.evidence - other.evidence, share, like)
+    return replace(test, placebos=against)
 
 
 def _against_others(test: ConditionTest, campaign: Campaign, progress: Callable[[str], None]) -> ConditionTest:
@@ -278,10 +319,11 @@ def _against_others(test: ConditionTest, campaign: Campaign, progress: Callable[
     What a condition leaves to explain, a force that no condition is, may look like another one turned round.
     """
     outdone = []
-    for name in sorted({one.effect.id for one in campaign.conditions} - {test.effect}):
+    for name in sorted({one.effect.id for one in campaign.conditions} - {test.effect, *test.beside}):
         title = effects()[name].title.lower()
         progress(f"estimating a {title} on headings that the vessel did not have")
-        for where, placebo in placebos(with_conditions(campaign, frozenset([name]))).items():
+        instead = with_conditions(campaign, frozenset([name, *test.beside]))
+        for where, placebo in placebos(instead, name).items():
             if estimate_campaign(placebo, noise=test.fit.noise).evidence > test.fit.evidence:
                 outdone.append(f"{title} on {where}")
     return replace(test, outdone=tuple(outdone))
@@ -293,7 +335,7 @@ def _finding(test: ConditionTest, i: int, tests: tuple[ConditionTest, ...]) -> F
     if not any(one.effect.id == test.effect for one in fit.campaign.members[i].conditions):
         return None
     value, covariance = test.condition(i)
-    parameters = [one for _, one in fit.campaign.own]
+    parameters = test.parameters
     neutral = np.array([one.neutral for one in parameters])
     away = value - neutral
     # The posterior outside the contour through none at all.
@@ -337,7 +379,8 @@ def _finding(test: ConditionTest, i: int, tests: tuple[ConditionTest, ...]) -> F
 
 def _figure(test: ConditionTest, i: int, errors: LogErrors, shares: Floats, value: Floats) -> dict[str, Any]:
     """Return the columns of the figure of a log's condition: held-out errors against what gives it away."""
-    condition, axis = test.fit.campaign.conditions[0], axis_of_errors(errors.before, errors.after, shares)
+    condition = test.fit.campaign.conditions[test.place]
+    axis = axis_of_errors(errors.before, errors.after, shares)
     regressor = condition.effect.regressor
     known = None if regressor is None else regressor(test.none.force_model(i), value, None, AXES[axis])
     return error_columns(errors.windows, (errors.before, errors.after), axis, known)
@@ -358,8 +401,10 @@ def note(test: ConditionTest, logs: int) -> str:
     title, found = effects()[test.effect].title, "confirmed" if test.confirmed else "not confirmed"
     have = sum(any(each.effect.id == test.effect for each in one.conditions) for one in test.fit.campaign.members)
     whose = "each log" if have == logs else f"{have} of {counted(logs, 'log')}"
+    others = [f"a {effects()[one].title.lower()}" for one in test.beside]
+    beside = f" beside {listed(others)}" if others else ""
     told = (
-        f"{title} of {whose}, estimated with one hull for all {logs}: {found}. "
+        f"{title} of {whose}, estimated with one hull for all {logs}{beside}: {found}. "
         f"Over none, evidence {test.evidence:+.0f} nat, likelihood of held-out stretches {_range(test.gain)}"
     )
     for place, one in test.placebos.items():

@@ -105,7 +105,7 @@ def held_out_blocks(windows: Windows) -> Iterator[tuple[slice, slice]]:
             yield slice(begin, stop), slice(max(first, begin - purge), min(end, stop + purge))
 
 
-def likeness(made: CampaignFit, none: CampaignFit, other: CampaignFit) -> float:
+def imitated_share(made: CampaignFit, none: CampaignFit, other: CampaignFit, rows: Sequence[int]) -> float:
     """Return the share of what a condition explains that another would explain too, if the condition is what acts.
 
     What the condition changes in the gaps, and nothing else, takes the place of the logs; hull and steady forces take up what
@@ -115,12 +115,13 @@ def likeness(made: CampaignFit, none: CampaignFit, other: CampaignFit) -> float:
     ----------
     made, none, other
         The logs with the condition, without it, and with the other in its place, under one noise.
+    rows
+        Which parameters of a log's own conditions are the condition's.
     """
-    campaign, count = made.campaign, len(made.campaign.own)
-    signals = []
+    campaign, signals = made.campaign, []
     for i, own in enumerate(made.own):
         still = own.copy()
-        still[:count] = -made.common[campaign.means]
+        still[rows] = -made.common[campaign.means][rows]
         change = campaign.gap(i, made.common, own) - campaign.gap(i, made.common, still)
         signals.append(made.noise.white(i, change, campaign.members[i].windows.runs))
     alone, itself, instead = (_left(one, signals) for one in (none, made, other))
@@ -138,8 +139,8 @@ def _left(fit: CampaignFit, signals: Sequence[Floats]) -> float:
     return left
 
 
-def placebos(campaign: Campaign) -> dict[str, Campaign]:
-    """Return the campaign with conditions that cannot be true: on the mirrored heading, and on that of another log.
+def placebos(campaign: Campaign, effect: str) -> dict[str, Campaign]:
+    """Return the campaign with a condition that cannot be true: on the mirrored heading, and on that of another log.
 
     Headings that are all but the vessel's own, as those of logs of one manoeuvre, make none; nor do those of another log that
     differ by the same angle all along, as in turning circles: from another side, the condition is the same on them.
@@ -148,7 +149,9 @@ def placebos(campaign: Campaign) -> dict[str, Campaign]:
     others = [np.resize(every[(i + 1) % len(every)], len(psi)) for i, psi in enumerate(every)]
     headings = {MIRRORED: [-psi for psi in every], EXCHANGED: others}
     turns = {MIRRORED: _turn(every, headings[MIRRORED]), EXCHANGED: _turn(every, headings[EXCHANGED], steady=True)}
-    return {name: _turned(campaign, found) for name, found in headings.items() if turns[name] > JUDGING.placebo_turn}
+    return {
+        name: _turned(campaign, effect, found) for name, found in headings.items() if turns[name] > JUDGING.placebo_turn
+    }
 
 
 def _turn(headings: Sequence[Floats], others: Sequence[Floats], *, steady: bool = False) -> float:
@@ -164,9 +167,12 @@ def _turn(headings: Sequence[Floats], others: Sequence[Floats], *, steady: bool 
     return float(np.degrees(np.sqrt(np.mean(away**2)))) if away.size else 0.0
 
 
-def _turned(campaign: Campaign, headings: Sequence[Floats]) -> Campaign:
+def _turned(campaign: Campaign, effect: str, headings: Sequence[Floats]) -> Campaign:
     members = tuple(
-        replace(member, conditions=tuple(turned(one, psi) for one in member.conditions))
+        replace(
+            member,
+            conditions=tuple(turned(one, psi) if one.effect.id == effect else one for one in member.conditions),
+        )
         for member, psi in zip(campaign.members, headings, strict=True)
     )
     return replace(campaign, members=members)

@@ -74,20 +74,19 @@ def _estimated(test: ConditionTest) -> LoadDifference | None:
     fit = test.fit
     campaign = fit.campaign
     groups = np.array([member.group for member in campaign.members])
-    parameters = [one for _, one in campaign.own]
+    parameters, rows = test.parameters, test.rows
     size = np.array([one.size for one in parameters])
-    q = len(parameters)
     # Weights of the logs' own parts in the difference; what all logs have in common cancels.
     weights = (groups == GROUPS[1]) / max(1, np.sum(groups == GROUPS[1])) - (groups == GROUPS[0]) / max(
         1, np.sum(groups == GROUPS[0])
     )
-    back = -sum(w * one[:q] for w, one in zip(weights, fit.normal.back, strict=True))
-    own = sum(w**2 * np.linalg.inv(one)[:q, :q] for w, one in zip(weights, fit.normal.own, strict=True))
+    back = -sum(w * one[rows] for w, one in zip(weights, fit.normal.back, strict=True))
+    own = sum(w**2 * np.linalg.inv(one)[np.ix_(rows, rows)] for w, one in zip(weights, fit.normal.own, strict=True))
     covariance = back @ fit.normal.common_covariance @ back.T + own
     factor = INFERENCE.posterior_factor**2 * max(1.0, fit.disagreement)
     error = size * np.sqrt(factor * np.diag(covariance))
     neutral = np.array([one.neutral for one in parameters])
-    each = neutral + size * (fit.common[campaign.means] + fit.own[:, :q])
+    each = neutral + size * (fit.common[campaign.means][rows] + fit.own[:, rows])
     mean = {
         group: dict(zip([one.name for one in parameters], each[groups == group].mean(axis=0).tolist(), strict=True))
         for group in GROUPS

@@ -17,7 +17,7 @@ from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.diagnose.inference.stages import AveragedLog
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.campaign_conditions import ConditionTest
-from ferryid.diagnose.judging.campaign_evidence import Gain, held_out_loss, without_conditions
+from ferryid.diagnose.judging.campaign_evidence import Gain, held_out_loss, with_conditions
 from ferryid.effects.force_model import Measurements
 from ferryid.models import Model
 from ferryid.signals.complementary_filter import MEAN_S
@@ -118,7 +118,7 @@ def hidden_gains(
 
 def gain_of(test: ConditionTest, informed: Sequence[Member], logs: int) -> HiddenGain:
     """Return the gain of a condition that some logs know, in the place of estimating it, under the noise of the estimate."""
-    campaign = without_conditions(replace(test.fit.campaign, members=tuple(informed)))
+    campaign = with_conditions(replace(test.fit.campaign, members=tuple(informed)), frozenset(test.beside))
     made = estimate_campaign(campaign, noise=test.fit.noise)
     estimated, measured = (one.gain(test.loss[0]) for one in (test.loss[1], held_out_loss(made)))
     return HiddenGain.of(estimated, measured, logs)

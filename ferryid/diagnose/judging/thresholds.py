@@ -159,7 +159,7 @@ class JudgingThresholds:
         "most that a placebo may have besides what it imitates of a condition that acts",
         "convention: a quarter, where a true condition leaves nothing, and a guessed hull that is off as much as for itself",
     )
-    placebo_likeness: float = threshold(
+    placebo_imitated: float = threshold(
         0.67,
         "of what a condition explains",
         "most that a placebo may imitate for that to count",

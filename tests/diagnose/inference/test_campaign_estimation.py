@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.data.measurements import window_lengths
+from ferryid.diagnose.inference import campaign_estimation
 from ferryid.diagnose.inference.campaign import CommonHull, _conditions_of_logs
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit, estimate_campaign
 from ferryid.diagnose.inference.campaign_model import INDUCED, Campaign, HullPrior, Member
@@ -22,7 +23,7 @@ from ferryid.diagnose.judging.campaign_evidence import (
     EXCHANGED,
     MIRRORED,
     Gain,
-    likeness,
+    imitated_share,
     placebos,
     without_conditions,
 )
@@ -44,14 +45,17 @@ SPREAD = 0.3 * np.abs(hull_of(FERRY))
 
 @cache
 def campaign(
-    winds: tuple[tuple[float, float], ...] = WINDS, factor: float = 1.0, conditions: tuple[str, ...] = ("wind",)
+    winds: tuple[tuple[float, float], ...] = WINDS,
+    factor: float = 1.0,
+    conditions: tuple[str, ...] = ("wind",),
+    current: tuple[float, float] = (0.0, 0.0),
 ) -> Campaign:
     """Return logs in some winds; the last was of a vessel whose forces are a factor larger than thought."""
     members = []
     wrong = hull_of(FERRY) * np.where(np.arange(len(SPREAD)) % 2, 1.15, 0.85)
     for number, wind in enumerate(winds):
         # Each log begins elsewhere in the same forces, so that they are three.
-        measurements = sailed(300.0 + 60.0 * number, np.array(wind))
+        measurements = sailed(300.0 + 60.0 * number, np.array(wind), current=current)
         rows = slice(300 * number, None)
         measurements = replace(
             measurements,
@@ -157,12 +161,12 @@ def test_one_log_more_changes_nothing_where_it_says_nothing() -> None:
 def test_what_a_placebo_imitates_of_a_wind_that_blew_is_what_it_explains() -> None:
     made = fitted()
     none = estimate_campaign(without_conditions(campaign()), noise=made.noise)
-    assert likeness(made, none, none) == pytest.approx(0.0, abs=1e-9)
-    assert likeness(made, none, made) == pytest.approx(1.0)
-    for placebo in placebos(campaign()).values():
+    assert imitated_share(made, none, none, [0, 1]) == pytest.approx(0.0, abs=1e-9)
+    assert imitated_share(made, none, made, [0, 1]) == pytest.approx(1.0)
+    for placebo in placebos(campaign(), "wind").values():
         other = estimate_campaign(placebo, noise=made.noise)
         share = (other.evidence - none.evidence) / (made.evidence - none.evidence)
-        assert likeness(made, none, other) == pytest.approx(share, abs=0.1)
+        assert imitated_share(made, none, other, [0, 1]) == pytest.approx(share, abs=0.1)
 
 
 @pytest.mark.parametrize(
@@ -190,13 +194,39 @@ def test_winds_are_confirmed_over_all_logs_and_a_current_is_not() -> None:
     assert ": confirmed." in note(wind, 3)
 
 
+def test_a_wind_that_a_current_hides_is_confirmed_beside_it() -> None:
+    stream = (0.35, -0.25)
+    made = campaign(conditions=("wind", "current"), current=stream)
+    judged = judge_conditions(made, {"a": 0, "b": 1, "c": 2}, no_progress)
+    assert [(one.effect, one.beside) for one in judged.tests if one.confirmed] == [
+        ("current", ("wind",)),
+        ("wind", ("current",)),
+    ]
+    # Each log has both as they were: the wind that it would have without a current is another.
+    for path, wind in zip("abc", WINDS, strict=True):
+        found = {claim.finding.effect: claim.finding.parameters for claim in judged.claims(path)}
+        for name, true in (("wind", wind), ("current", stream)):
+            assert [found[name][one].value for one in ("north", "east")] == pytest.approx(true, abs=0.05)
+    assert "estimated with one hull for all 3 beside a current: confirmed." in note(judged.tests[1], 3)
+
+
+def test_a_log_that_settled_on_a_wind_from_the_other_side_is_brought_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = campaign(conditions=("wind", "current"), current=(0.35, -0.25))
+    monkeypatch.setattr(campaign_estimation, "SEARCHES", 0)
+    settled = estimate_campaign(made)
+    monkeypatch.undo()
+    found = estimate_campaign(made)
+    away = [[np.linalg.norm(one.condition(i, 1)[0] - WINDS[i]) for i in range(3)] for one in (settled, found)]
+    assert max(away[0]) > 3.0
+    assert max(away[1]) < 0.05
+
+
 def test_two_conditions_that_are_confirmed_alike_are_hints(monkeypatch: pytest.MonkeyPatch) -> None:
     (wind,) = judge_conditions(campaign(), {"a": 0, "b": 1, "c": 2}, no_progress).tests
     assert wind.confirmed
     behind = {"wind": 0.0}
 
-    def tested(made: Campaign, _: object) -> ConditionTest:
-        (name,) = {one.effect.id for one in made.conditions}
+    def tested(made: Campaign, name: str, _: object) -> ConditionTest:
         return replace(wind, effect=name, fit=replace(wind.fit, campaign=made), evidence=wind.evidence - behind[name])
 
     both = campaign(conditions=("wind", "current"))
@@ -231,19 +261,19 @@ def test_references_that_measured_what_a_log_did_not_have_no_conditions() -> Non
 def test_like_headings_make_no_placebo() -> None:
     made = campaign()
     first = made.members[0]
-    assert set(placebos(made)) == {MIRRORED, EXCHANGED}
+    assert set(placebos(made, "wind")) == {MIRRORED, EXCHANGED}
     # Twice the same manoeuvre: the other log's heading is its own.
-    assert set(placebos(replace(made, members=(first, first)))) == {MIRRORED}
+    assert set(placebos(replace(made, members=(first, first)), "wind")) == {MIRRORED}
     eta = first.windows.measurements.eta.copy()
     eta[:, 2] = 0.1
     straight = replace(first, windows=replace(first.windows, measurements=replace(first.windows.measurements, eta=eta)))
-    assert placebos(replace(made, members=(straight, straight))) == {}
+    assert placebos(replace(made, members=(straight, straight)), "wind") == {}
     # Two circles the same way round: the other's heading is the log's own, but for an angle; one the other way round is not.
     turning = (0.2 * t for t in (first.windows.measurements.t,) * 2)
     circles = [_headed(first, psi + at) for psi, at in zip(turning, (0.0, 2.0), strict=True)]
-    assert set(placebos(replace(made, members=tuple(circles)))) == {MIRRORED}
+    assert set(placebos(replace(made, members=tuple(circles)), "wind")) == {MIRRORED}
     other = _headed(first, -0.2 * first.windows.measurements.t)
-    assert set(placebos(replace(made, members=(circles[0], other)))) == {MIRRORED, EXCHANGED}
+    assert set(placebos(replace(made, members=(circles[0], other)), "wind")) == {MIRRORED, EXCHANGED}
 
 
 def _headed(member: Member, psi: Floats) -> Member:

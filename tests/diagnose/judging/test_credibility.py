@@ -153,7 +153,9 @@ def condition(axes: tuple[float, float, float], share: float) -> ConditionTest:
     """Return a wind that the evidence favours, with the errors that it leaves by axis, of one, and how much it is felt."""
     plain = SimpleNamespace(hull=np.array([1.0, 1.0, 0.0, 0.0, 1.0]), measurements=SimpleNamespace(profile=FERRY))
     own = [(0, Parameter(name, "m/s", 4.0, -30.0, 30.0)) for name in ("north", "east")]
-    campaign = SimpleNamespace(members=(SimpleNamespace(plain=plain, windows=None),) * 2, own=own)
+    wind = SimpleNamespace(effect=SimpleNamespace(id="wind"))
+    members = (SimpleNamespace(plain=plain, windows=None),) * 2
+    campaign = SimpleNamespace(members=members, own=own, conditions=(wind,))
     fit = SimpleNamespace(campaign=campaign, condition=lambda i, k: (np.array([1.0, 29.9 * i]), np.eye(2)))
     loss = tuple(
         HeldOutLoss(np.ones(1), np.zeros(1, dtype=int), (np.ones((4, 3)) * np.sqrt(each),) * 2)
