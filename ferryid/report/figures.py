@@ -7,13 +7,15 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from copy import copy
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Tick
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 from numpy.typing import NDArray
 
 from ferryid.identify import ComponentCurve, Excitation, LogFit
@@ -110,8 +112,27 @@ def plain_log(ax: Axes, *, x: bool, y: bool) -> None:
             axis.set_minor_formatter(NullFormatter())
 
 
+def _copy_ticks(ticks: list[Tick], count: int) -> None:
+    """Fill a list of ticks up with copies of its first: making each from its styles takes longer than drawing it.
+
+    Matplotlib makes those that are missing when it draws. What its ticks have in common (transforms, markers, fonts) it only
+    replaces, so that copies may share it.
+    """
+    while len(ticks) < count:
+        first = ticks[0]
+        tick = copy(first)
+        for name in ("tick1line", "tick2line", "gridline", "label1", "label2"):
+            setattr(tick, name, copy(getattr(first, name)))
+        ticks.append(tick)
+
+
 def svg_text(figure: Figure) -> str:
     """Return the drawing of a figure, the same for the same figure."""
+    for ax in figure.axes:
+        for axis in (ax.xaxis, ax.yaxis):
+            _copy_ticks(axis.majorTicks, len(axis.get_majorticklocs()))
+            if not isinstance(axis.get_minor_locator(), NullLocator):
+                _copy_ticks(axis.minorTicks, len(axis.get_minorticklocs()))
     text = io.StringIO()
     figure.savefig(text, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
     drawing = text.getvalue()
