@@ -30,8 +30,10 @@ def main() -> None:
             sys.stdout.write(f"ferryid {ferryid.__version__}\n")
             return
         from ferryid import interrupts
+        from ferryid.report import page_process
 
         interrupts.end_in_time()
+        page_process.allow()
         try:
             run(last=interrupts.end)
         finally:

@@ -13,10 +13,12 @@ from ferryid.files import alone
 from ferryid.identify import FitOutcome, FitSettings, fit_archive, fit_logs
 from ferryid.models import model_to_json
 from ferryid.models.store import StoredModel, assign_version, plan, save
-from ferryid.report.folder import PAGE, made, write_folder
+from ferryid.report.folder import PAGE, write_folder
 from ferryid.report.headline import headline_of
+from ferryid.report.interactive import write_assets
 from ferryid.report.model_text import describe_settings
 from ferryid.report.outcome import Report
+from ferryid.report.page_process import PageProcess, started
 from ferryid.types import AXES, RunContext
 from ferryid.vessel.profile import Profile
 
@@ -74,7 +76,8 @@ def fit_and_report(
     FerryIdError
         For unusable input or an output folder that cannot be written; nothing half-written is left.
     """
-    return _reported(fit_logs(logs, profile, settings, run, name=name), run, page)
+    with started(page) as process:
+        return _reported(fit_logs(logs, profile, settings, run, name=name), run, page, process)
 
 
 def fit_archive_and_report(
@@ -87,10 +90,11 @@ def fit_archive_and_report(
     page: bool = True,
 ) -> FitReport:
     """Fit a model to the block sums of the logs in the output folder, else as `fit_and_report`."""
-    return _reported(fit_archive(profile, settings, run, logs, name=name), run, page)
+    with started(page) as process:
+        return _reported(fit_archive(profile, settings, run, logs, name=name), run, page, process)
 
 
-def _reported(result: FitOutcome, run: RunContext, page: bool) -> FitReport:
+def _reported(result: FitOutcome, run: RunContext, page: bool, process: PageProcess | None) -> FitReport:
     run.progress("writing the report" if page else "storing the model")
     out = run.out
     with alone(out / "models"):
@@ -99,24 +103,28 @@ def _reported(result: FitOutcome, run: RunContext, page: bool) -> FitReport:
         stored = plan(result.model, out)
         plain = as_json(result, stored, report if page else None)
         if page:
-            _write_page(result, report.parent, plain, run)
+            _write_page(result, report.parent, plain, run, process)
         else:
             save(result.model, out)
     run.progress("")
     return FitReport(plain, as_text(result, stored, report if page else None), report, stored)
 
 
-def _write_page(result: FitOutcome, folder: Path, plain: Mapping[str, Any], run: RunContext) -> None:
+def _write_page(
+    result: FitOutcome, folder: Path, plain: Mapping[str, Any], run: RunContext, process: PageProcess | None
+) -> None:
     """Write the report of a fit, and store its model."""
-    # What draws takes half a second to import.
-    from ferryid.report.fit_timeline import fit_timeline
-    from ferryid.report.interactive import make_interactive
-    from ferryid.report.page import MAX_LOGS, render
+    out = run.tables_out or run.out
+    page = None if process is None else process.page_of(result, folder, out, run.command)
+    if page is None:
+        # What draws takes half a second to import.
+        from ferryid.report.page import page_of
 
-    timelines = {k: fit_timeline(log) for k, log in enumerate(result.logs[:MAX_LOGS])}
-    interactive = make_interactive(timelines, folder, run.tables_out or run.out)
-    text, drawings = render(result, interactive, made(run.command))
-    write_folder(folder, text, drawings, plain, "fit.json", lambda: save(result.model, run.out), interactive.files())
+        page = page_of(result, folder, out, run.command)
+    text, drawings, scripts = page
+    if scripts:
+        write_assets(out)
+    write_folder(folder, text, drawings, plain, "fit.json", lambda: save(result.model, run.out), scripts)
 
 
 def as_json(result: FitOutcome, stored: StoredModel, report: Path | None) -> dict[str, Any]:

@@ -89,11 +89,18 @@ def make_interactive(timelines: Mapping[int, Timeline | None], folder: Path, out
     FerryIdError
         For a folder that cannot be written; nothing half-written is left.
     """
+    found = interactive_of(timelines, folder, out)
+    if found.timelines:
+        write_assets(out)
+    return found
+
+
+def interactive_of(timelines: Mapping[int, Timeline | None], folder: Path, out: Path) -> Interactive:
+    """Return what the page in a folder shows with the scripts of the output folder, which are to be written yet."""
     made = {log: one for log, one in timelines.items() if one is not None}
     if not made or not available():
         return STATIC
     key, _ = _contents()
-    write_assets(out)
     return Interactive(made, os.path.relpath(out / "reports" / "assets" / key, folder).replace(os.sep, "/"))
 
 

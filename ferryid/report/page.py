@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,9 +13,11 @@ from ferryid.identify import FitOutcome, LogFit
 from ferryid.models import RANGE_UNITS, ForceScores
 from ferryid.models.forces import effective_mass
 from ferryid.report import figures
+from ferryid.report.fit_timeline import fit_timeline
+from ferryid.report.folder import made
 from ferryid.report.headline import headline_of
 from ferryid.report.html import template
-from ferryid.report.interactive import STATIC, Interactive
+from ferryid.report.interactive import STATIC, Interactive, interactive_of
 from ferryid.report.left_out import left_out_table
 from ferryid.report.structure import remainder, worst_and_best_minute
 from ferryid.types import AXES, Floats
@@ -23,6 +26,34 @@ from ferryid.vessel.parse_hull import rigid_mass
 
 MAX_LOGS = 6
 """Logs whose forces are drawn; the page stays below ten megabytes and readable."""
+
+
+Page = tuple[str, dict[str, str], dict[str, str]]
+"""HTML, drawings (SVG) by name, and the data of the interactive figures by file name."""
+
+
+def page_of(result: FitOutcome, folder: Path, out: Path, command: Sequence[str]) -> Page:
+    """Return the report of a fit.
+
+    Parameters
+    ----------
+    result
+        The fit.
+    folder, out
+        Folder of the page, and the output folder that keeps the scripts of interactive figures; see `write_assets`.
+    command
+        The words that it was asked for with.
+    """
+    timelines = {k: fit_timeline(log) for k, log in enumerate(result.logs[:MAX_LOGS])}
+    interactive = interactive_of(timelines, folder, out)
+    text, drawings = render(result, interactive, made(command))
+    return text, drawings, interactive.files()
+
+
+def load_all() -> None:
+    """Load what is loaded otherwise when the first page is made."""
+    template("fit.html")
+    figures.svg_text(figures.margins(1.0))
 
 
 def render(
