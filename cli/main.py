@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from typing import TYPE_CHECKING
@@ -34,6 +35,8 @@ def main() -> None:
 
         interrupts.end_in_time()
         page_process.allow()
+        # Modules and arrays are no circles of references; each search for some goes through all of them.
+        gc.set_threshold(50_000, 20, 20)
         try:
             run(last=interrupts.end)
         finally:

@@ -15,16 +15,19 @@ def envelope(t: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Thin a series to at most `POINTS` bins, keeping the least and greatest of each so that no peak is lost."""
     if len(t) <= 2 * POINTS:
         return t, values
-    bins = np.array_split(np.arange(len(t)), POINTS)
-    keep: list[int] = []
-    for rows in bins:
-        part = values[rows]
-        if np.isfinite(part).all():
-            keep.extend(sorted({int(rows[np.argmin(part)]), int(rows[np.argmax(part)])}))
-        else:
-            # A bin that touches a gap keeps one missing point, so that the line breaks there.
-            keep.append(int(rows[np.argmax(~np.isfinite(part))]))
-    return t[keep], values[keep]
+    # Bins of two sizes, the larger ones first.
+    size, larger = divmod(len(t), POINTS)
+    keep = []
+    for start, bins, rows in ((0, larger, size + 1), (larger * (size + 1), POINTS - larger, size)):
+        part = values[start : start + bins * rows].reshape(bins, rows)
+        missing = ~np.isfinite(part)
+        gap = missing.any(axis=1)
+        # A bin that touches a gap keeps one missing point, so that the line breaks there.
+        place = missing.argmax(axis=1)
+        for extreme in (part.argmin(axis=1), part.argmax(axis=1)):
+            keep.append(start + rows * np.arange(bins) + np.where(gap, place, extreme))
+    kept = np.unique(np.concatenate(keep))
+    return t[kept], values[kept]
 
 
 def _stretch(log: LogFit, name: str, j: int) -> Floats:
