@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, Template
@@ -10,6 +11,7 @@ from ferryid.counts import counted
 from ferryid.errors import printable
 
 
+@cache
 def template(name: str) -> Template:
     """Return a template by its file name; whatever a page of HTML shows is escaped."""
     environment = Environment(

@@ -52,8 +52,12 @@ def page_of(result: FitOutcome, folder: Path, out: Path, command: Sequence[str])
 
 def load_all() -> None:
     """Load what is loaded otherwise when the first page is made."""
-    template("fit.html")
-    figures.svg_text(figures.margins(1.0))
+    pages = template("fit.html").environment
+    for name in ("figures.html", "left_out.html", "style.html"):
+        pages.get_template(name)
+    figure = figures.margins(1.0)
+    figure.subplots().set_title("fonts")
+    figures.svg_text(figure)
 
 
 def render(
