@@ -7,8 +7,10 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
+from functools import cache
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -71,31 +73,64 @@ def _layer(path: Path) -> str:
     return "cli" if parts[0] == "cli" else Path(parts[1]).stem
 
 
+@cache
+def _import_statements(path: Path) -> tuple[list[ast.Import | ast.ImportFrom], list[ast.ImportFrom], list[str]]:
+    """Return the imports of a file, those among them that run when it is imported, and the names in its `__all__`.
+
+    A file is parsed once for all rules.
+    """
+    top = ast.parse(path.read_text(encoding="utf-8")).body
+    every = [node for node in _statements(top) if isinstance(node, ast.Import | ast.ImportFrom)]
+    public = [
+        name
+        for node in top
+        if isinstance(node, ast.Assign) and [getattr(target, "id", "") for target in node.targets] == ["__all__"]
+        for name in ast.literal_eval(node.value)
+    ]
+    return every, [node for node in top if isinstance(node, ast.ImportFrom)], public
+
+
+def _statements(body: list[Any]) -> Iterator[ast.AST]:
+    """Yield statements and those within them; no import stands in an expression."""
+    for node in body:
+        yield node
+        for inside in ("body", "orelse", "finalbody", "handlers", "cases"):
+            yield from _statements(getattr(node, inside, []))
+
+
 def _imports(path: Path) -> Iterator[tuple[int, str]]:
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in _import_statements(path)[0]:
         if isinstance(node, ast.Import):
             yield from ((node.lineno, alias.name) for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{path}: relative import"
+        else:
+            assert node.level == 0, f"{path}:{node.lineno}: relative import"
             yield node.lineno, node.module or ""
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("path", _modules(), ids=lambda path: str(path.relative_to(ROOT)))
-def test_imports_point_one_way(path: Path) -> None:
+def test_imports_point_one_way() -> None:
+    found = [told for path in _modules() for told in _against_the_order(path)]
+    assert not found, "\n".join(found)
+
+
+def _against_the_order(path: Path) -> Iterator[str]:
+    """Yield the imports of a file that a later layer, or none, should have; a test for each file takes longer than this."""
     layer = _layer(path)
     if layer in ("__init__", "schemas"):
         allowed: tuple[str, ...] = ()
-    else:
-        assert layer in ORDER, f"{layer} has no place in the order of layers"
+    elif layer in ORDER:
         allowed = ORDER[: ORDER.index(layer) + 1]
+    else:
+        yield f"{path}: {layer} has no place in the order of layers"
+        return
     for line, name in _imports(path):
         package, _, rest = name.partition(".")
         if package == "ferryid" and rest:
             target = rest.partition(".")[0]
-            assert target in allowed or target == "schemas", f"{path}:{line} imports {name} from a later layer"
-        if package in HOMES:
-            assert layer in HOMES[package], f"{path}:{line} imports {package}, which belongs to {HOMES[package]}"
+            if target not in allowed and target != "schemas":
+                yield f"{path}:{line} imports {name} from a later layer"
+        if layer not in HOMES.get(package, (layer,)):
+            yield f"{path}:{line} imports {package}, which belongs to {HOMES[package]}"
 
 
 BORDERS = ("regression", "models", "identify", "compare")
@@ -109,27 +144,32 @@ def _packages() -> list[Path]:
 
 def _public(path: Path) -> list[str]:
     """Return the names in the `__all__` of a file; none where it has no such list."""
-    for node in ast.parse(path.read_text(encoding="utf-8")).body:
-        if isinstance(node, ast.Assign) and [getattr(target, "id", "") for target in node.targets] == ["__all__"]:
-            return list(ast.literal_eval(node.value))
-    return []
+    return _import_statements(path)[2]
 
 
-@pytest.mark.parametrize("path", _modules(), ids=lambda path: str(path.relative_to(ROOT)))
-def test_others_import_from_the_borders_of_a_package(path: Path) -> None:
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        imported = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
-        if isinstance(node, ast.ImportFrom):
-            imported = [node.module or ""]
+def test_others_import_from_the_borders_of_a_package() -> None:
+    found = [told for path in _modules() for told in _past_a_border(path)]
+    assert not found, "\n".join(found)
+
+
+def _past_a_border(path: Path) -> Iterator[str]:
+    """Yield the imports of a file from inside another package that has a border."""
+    for node in _import_statements(path)[0]:
+        imported = [alias.name for alias in node.names] if isinstance(node, ast.Import) else [node.module or ""]
         for name in imported:
             parts = name.split(".")
             if parts[0] != "ferryid" or len(parts) < 2 or parts[1] not in BORDERS or parts[1] == _layer(path):
                 continue
             init = ROOT.joinpath(*parts, "__init__.py")
-            assert init.exists(), f"{path}:{node.lineno} imports the module {name}; import from its package"
-            assert isinstance(node, ast.ImportFrom), f"{path}:{node.lineno} imports {name} as a whole"
-            for alias in node.names:
-                assert alias.name in _public(init), f"{path}:{node.lineno} {alias.name} is not public in {name}"
+            if not init.exists():
+                yield f"{path}:{node.lineno} imports the module {name}; import from its package"
+            elif isinstance(node, ast.Import):
+                yield f"{path}:{node.lineno} imports {name} as a whole"
+            else:
+                names = _public(init)
+                for alias in node.names:
+                    if alias.name not in names:
+                        yield f"{path}:{node.lineno} {alias.name} is not public in {name}"
 
 
 @pytest.mark.parametrize("path", _packages(), ids=lambda path: str(path.parent.relative_to(ROOT)))
@@ -156,15 +196,13 @@ def test_no_circle_of_imports() -> None:
 
 def _needed(path: Path) -> Iterator[str]:
     """Yield what a module imports when it is imported itself, of a package the module that has the name."""
-    for node in ast.parse(path.read_text(encoding="utf-8")).body:
-        if isinstance(node, ast.ImportFrom):
-            names = [node.module or "", *(f"{node.module}.{alias.name}" for alias in node.names)]
-            own = ".".join(path.relative_to(ROOT).with_suffix("").parts)
-            for name in names:
-                yield name
-                # Packages around what is imported are imported first.
-                around = (name.rpartition(".")[0], ".".join(name.split(".")[:2]), ".".join(name.split(".")[:3]))
-                yield from (package for package in around if not own.startswith(f"{package}."))
+    own = ".".join(path.relative_to(ROOT).with_suffix("").parts)
+    for node in _import_statements(path)[1]:
+        for name in [node.module or "", *(f"{node.module}.{alias.name}" for alias in node.names)]:
+            yield name
+            # Packages around what is imported are imported first.
+            around = (name.rpartition(".")[0], ".".join(name.split(".")[:2]), ".".join(name.split(".")[:3]))
+            yield from (package for package in around if not own.startswith(f"{package}."))
 
 
 @pytest.mark.slow
