@@ -27,19 +27,19 @@ class _Loop:
         return self._dispatcher(*given, **named)
 
     def __getattr__(self, name: str) -> Any:
-        if name == "_dispatcher":
+        if name in ("_dispatcher", "_inner"):
             from ferryid.compiler import dispatcher_of
 
             # Each of two threads would compile for itself.
             with _lock:
                 if name not in self.__dict__:
-                    self.__dict__[name] = dispatcher_of(self.__wrapped__, **self._options)
+                    self.__dict__[name] = dispatcher_of(self.__wrapped__, inner=name == "_inner", options=self._options)
             return self.__dict__[name]
         if name == "_numba_type_":
             # What compiled functions that call this one take it for.
             from numba import types
 
-            return types.Dispatcher(self._dispatcher)
+            return types.Dispatcher(self._inner)
         if name.startswith("__"):
             raise AttributeError(name)
         return getattr(self._dispatcher, name)

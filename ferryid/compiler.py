@@ -133,10 +133,10 @@ class _StampedCache(FunctionCache):  # type: ignore[misc]
     code with wrong bits in worse, so that it is sealed with a checksum.
     """
 
-    def __init__(self, function: Callable[..., Any]) -> None:
+    def __init__(self, function: Callable[..., Any], *, inner: bool = False) -> None:
         super().__init__(function)
         # Not by the line, which moves with all that stands above.
-        base = re.sub(r"-\d+(?=\.py\d+)", "", self._impl.filename_base)
+        base = re.sub(r"-\d+(?=\.py\d+)", "-inner" * inner, self._impl.filename_base)
         self._cache_file = _SealedFile(self._cache_path, base, "")
         self._lock_path = Path(self._cache_path) / f"{base}.lock"
         self._lock: int | None = None
@@ -210,13 +210,24 @@ def cache_state(function: Callable[..., Any]) -> CacheState:
     return CacheState(Path(kept._cache_path), current)
 
 
-def dispatcher_of(function: Callable[..., Any], **options: bool) -> Any:
-    """Return numba's dispatcher of a function, kept on disk; the plain function where nothing is to be compiled."""
-    # Threads may run them side by side: see ferryid.diagnose.parallel.
-    dispatcher = numba.njit(function, nogil=True, **options)
+def dispatcher_of(function: Callable[..., Any], *, inner: bool, options: dict[str, bool]) -> Any:
+    """Return numba's dispatcher of a function, kept on disk; the plain function where nothing is to be compiled.
+
+    Parameters
+    ----------
+    function
+        The plain function.
+    inner
+        For calls from compiled functions alone: what takes Python's objects apart and puts the result together is left out. It
+        is longer than most functions, and would be compiled again with every function that calls them.
+    options
+        Of `numba.njit`.
+    """
+    # Threads may run them side by side: see ferryid.diagnose.parallel. No function is passed by its address: see `callback`.
+    dispatcher = numba.njit(function, nogil=True, no_cfunc_wrapper=True, no_cpython_wrapper=inner, **options)
     if not numba.config.DISABLE_JIT:
         with suppress(RuntimeError, OSError):  # RuntimeError is numba's word for "no folder to keep it in"
-            dispatcher._cache = _StampedCache(dispatcher.py_func)
+            dispatcher._cache = _StampedCache(dispatcher.py_func, inner=inner)
     return dispatcher
 
 

@@ -100,6 +100,20 @@ def test_threads_that_call_a_function_first_share_what_is_compiled() -> None:
     assert len(made) == 1
 
 
+def test_python_calls_what_was_compiled_for_compiled_functions_alone() -> None:
+    @compiled
+    def called(x: float) -> float:
+        return x + 1.0
+
+    @compiled
+    def calling(x: float) -> float:
+        return 2.0 * called(x)
+
+    assert calling(3.0) == 8.0
+    assert called(3.0) == 4.0
+    assert calling(4.0) == 10.0
+
+
 CALLER = """
 from callee import FACTOR, Pair, callee
 from ferryid.compiled import compiled

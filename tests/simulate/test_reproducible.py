@@ -117,8 +117,8 @@ if sys.argv[4:]:
     numba.config.DISABLE_JIT = 0
     native.numba = SimpleNamespace(njit=lambda function: function)
     dispatcher_of = compiler.dispatcher_of
-    compiler.dispatcher_of = lambda function, **options: (
-        dispatcher_of(function, **options) if function.__module__ in sys.argv[4:] else function
+    compiler.dispatcher_of = lambda function, **how: (
+        dispatcher_of(function, **how) if function.__module__ in sys.argv[4:] else function
     )
 
 from dataclasses import replace
