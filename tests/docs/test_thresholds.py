@@ -113,7 +113,7 @@ NO_DECISION = {
         diagnose.inference.campaign_estimation ROUNDS SETTLED CONVERGED_GAIN RELAXATION KEPT_SLOPES
         diagnose.inference.campaign_course KNOTS_A_MEMORY MOST_KNOTS
         diagnose.inference.campaign_model DIFFERENCE_STEP
-        diagnose.inference.campaign_estimation STARTS BEARINGS STEADY_SHARE HALVINGS SCALE_ROUNDS
+        diagnose.inference.campaign_estimation STARTS BEARINGS STEADY_SHARE HALVINGS SEARCHES CLEARLY_BETTER SCALE_ROUNDS
         diagnose.inference.campaign_properties WEIGHED
         effects.actuator_force _NODES
         effects.dead_band NODES
