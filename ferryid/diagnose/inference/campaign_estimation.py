@@ -397,6 +397,9 @@ def _gap(campaign: Campaign, common: Floats, own: Floats, i: int) -> Floats:
 def _first(campaign: Campaign) -> tuple[Spreads, _Point]:
     """Return spreads and estimates to begin with: the hull without conditions, then what explains most beside it."""
     common, own = np.zeros(campaign.g), np.zeros((len(campaign.members), campaign.l))
+    # Some properties, such as a dead band, have no slope where they do not act.
+    begun = [0.0 if one.start is None else (one.start - one.neutral) / one.size for one in campaign.lasting]
+    common[campaign.g - len(campaign.own) - len(begun) : campaign.g - len(campaign.own)] = begun
     gaps = np.vstack([campaign.gap(i, common, one) for i, one in enumerate(own)])
     steady = STEADY_SHARE * np.sqrt(np.mean(gaps**2, axis=0))
     spreads = Spreads((1.0,) * len(campaign.conditions), np.maximum(steady, 1e-12))

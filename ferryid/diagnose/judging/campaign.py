@@ -9,7 +9,9 @@ from functools import cached_property
 from ferryid.diagnose.inference.campaign import CommonHull
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit, estimate_campaign
 from ferryid.diagnose.inference.campaign_model import Campaign
+from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.force_errors import mass_of
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.campaign_conditions import JudgedConditions, judge_conditions, note
 from ferryid.diagnose.judging.campaign_errors import LogErrors
 from ferryid.diagnose.judging.campaign_evidence import HeldOutLoss, held_out_loss, without_conditions
@@ -106,16 +108,27 @@ def judge_campaign(campaign: Campaign, place: Mapping[str, int], progress: Calla
     """Judge what several logs say together: conditions, then properties beside them, then conditions beside these."""
     conditions = judge_conditions(campaign, place, progress)
     properties = judge_properties(conditions.hull.fit, progress)
-    confirmed = tuple(one.candidate for one in properties if one.confirmed)
+    confirmed = tuple(_begun(one) for one in properties if one.confirmed)
     if confirmed:
         conditions = judge_conditions(replace(campaign, properties=confirmed), place, progress)
         made = conditions.hull.fit
         again = {one.key: tested(made, one, ()) for one in made.campaign.properties}
-        properties = tuple(
+        found = (
             replace(again[one.candidate.key], rivals=one.rivals) if one.candidate.key in again else one
             for one in properties
         )
+        # What the evidence does not speak for beside the conditions is no hint either.
+        properties = tuple(one for one in found if one.evidence >= INFERENCE.prior_odds)
     return JudgedCampaign(conditions, properties, *_without_confirmed(conditions))
+
+
+def _begun(test: PropertyTest) -> Candidate:
+    """Return a property from whose estimate a search begins."""
+    parameters = tuple(
+        replace(one, start=test.estimates[one.name].value) if one.name in test.estimates else one
+        for one in test.candidate.parameters
+    )
+    return replace(test.candidate, parameters=parameters)
 
 
 def _without_confirmed(

@@ -8,13 +8,17 @@ from functools import cache
 import numpy as np
 import pytest
 
+from ferryid.diagnose.inference import campaign_estimation
 from ferryid.diagnose.inference.campaign_estimation import estimate_campaign
 from ferryid.diagnose.inference.campaign_model import Campaign, Member
 from ferryid.diagnose.inference.campaign_properties import properties_of, score, select_properties
+from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.weak_form import Windows
+from ferryid.diagnose.judging import campaign as judging
 from ferryid.diagnose.judging.campaign import judge_campaign
+from ferryid.effects import effects
 from ferryid.types import no_progress
-from tests.diagnose.inference.test_campaign_estimation import CALM, campaign
+from tests.diagnose.inference.test_campaign_estimation import CALM, FERRY, campaign
 
 pytestmark = pytest.mark.slow
 
@@ -74,6 +78,30 @@ def test_a_weak_thruster_is_found_over_all_logs(cut: bool) -> None:
 def test_a_sound_vessel_has_no_property() -> None:
     made, _ = select_properties(estimate_campaign(weakened(1.0)), no_progress)
     assert made.campaign.properties == ()
+
+
+@pytest.mark.parametrize("conditions", [(), ("wind",)])
+def test_a_search_begins_with_what_was_found_of_a_property(
+    conditions: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gain = Candidate.of(effects()["thruster_gain"], "thruster1", FERRY)
+    begun = replace(gain, parameters=tuple(replace(one, start=0.7) for one in gain.parameters))
+    whole = replace(campaign(CALM, conditions=conditions), properties=(begun,))
+    monkeypatch.setattr(campaign_estimation, "ROUNDS", 0)
+    monkeypatch.setattr(campaign_estimation, "SEARCHES", 0)
+    made = estimate_campaign(whole)
+    ((factor,),) = whole.values(made.common, made.own[0])[1]
+    assert factor == pytest.approx(0.7)
+
+
+def test_what_the_evidence_does_not_speak_for_beside_conditions_is_no_hint(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = weakened(0.8)
+    places = {str(i): i for i in range(len(whole.members))}
+    tested = judging.tested
+    monkeypatch.setattr(judging, "tested", lambda *given: replace(tested(*given), evidence=1.0))
+    judged = judge_campaign(whole, places, no_progress)
+    assert judged.properties == ()
+    assert judged.claims("0") == ()
 
 
 def test_scores_rank_as_fits_do() -> None:
