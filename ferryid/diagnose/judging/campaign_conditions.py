@@ -367,7 +367,9 @@ def _finding(test: ConditionTest, i: int, tests: tuple[ConditionTest, ...]) -> F
         mse=errors.mse,
         held_out=True,
         rivals=tuple(
-            Rival(one.effect, None, one.evidence - test.evidence) for one in tests if one.effect != test.effect
+            Rival(one.effect, None, one.evidence - test.evidence)
+            for one in tests
+            if one.effect not in (test.effect, *test.beside)
         ),
         unresolved_with=test.unresolved,
         separating_manoeuvre=manoeuvre(test.effect, test.unresolved, errors.windows.measurements.profile.setting),

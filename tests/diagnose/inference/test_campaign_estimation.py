@@ -205,6 +205,8 @@ def test_a_wind_that_a_current_hides_is_confirmed_beside_it() -> None:
     # Each log has both as they were: the wind that it would have without a current is another.
     for path, wind in zip("abc", WINDS, strict=True):
         found = {claim.finding.effect: claim.finding.parameters for claim in judged.claims(path)}
+        # Neither is an explanation in the other's place.
+        assert not any(claim.finding.rivals for claim in judged.claims(path))
         for name, true in (("wind", wind), ("current", stream)):
             assert [found[name][one].value for one in ("north", "east")] == pytest.approx(true, abs=0.05)
     assert "estimated with one hull for all 3 beside a current: confirmed." in note(judged.tests[1], 3)
