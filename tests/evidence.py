@@ -27,6 +27,7 @@ MAKERS: Mapping[str, tuple[str, ...]] = {
     "reports/plan.md": ("tests/plans",),
     "reports/proof.json": ("cli/cmd_prove.py",),
     "reports/proof-real.json": ("cli/cmd_prove.py",),
+    "reports/proof-sea.json": ("cli/cmd_prove.py",),
     "reports/proof.md": ("tests/proof",),
     "reports/real.md": ("tests/real",),
     "reports/real/diagnosis.md": ("tests/real",),

@@ -10,6 +10,7 @@ import ferryid
 EVALUATION = (
     *("report/", "reproduce/", "batch/", "schemas/", "cli/"),
     *(
+        "validation/campaign_oracle",
         "validation/estimate_errors",
         "validation/evaluators",
         "validation/name_scores",
@@ -19,6 +20,7 @@ EVALUATION = (
         "validation/recorded/scores",
         "validation/rivals/",
         "validation/scores",
+        "validation/sea_scores",
         "validation/transfer",
     ),
 )

@@ -1,6 +1,6 @@
-"""Writes reports/proof.md from the stored results of both proofs: ``python -m tests.proof [FOLDER]``.
+"""Writes reports/proof.md from the stored results of the proofs: ``python -m tests.proof [FOLDER]``.
 
-``proof.json`` and ``proof-real.json`` in the folder are what `ferryid prove` wrote; either may be missing.
+``proof.json``, ``proof-sea.json`` and ``proof-real.json`` in the folder are what `ferryid prove` wrote; any may be missing.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from tests.evidence import ROOT, stamp
 from tests.real import withheld
 
 REPORTS = ROOT / "reports"
-SIMULATED, REAL, PAGE = "proof.json", "proof-real.json", "proof.md"
+SIMULATED, SEA, REAL, PAGE = "proof.json", "proof-sea.json", "proof-real.json", "proof.md"
 Result = Mapping[str, Any]
 MULTIPLE = 2.0
 """Of the oracle's size, at which nine in ten ought to be named."""
@@ -40,41 +40,48 @@ MULTIPLE = 2.0
 def main(folder: Path) -> None:
     """Write the page of a folder."""
     found = {
-        name: json.loads((folder / name).read_text("utf-8")) for name in (SIMULATED, REAL) if (folder / name).exists()
+        name: json.loads((folder / name).read_text("utf-8"))
+        for name in (SIMULATED, SEA, REAL)
+        if (folder / name).exists()
     }
     if not found:
-        sys.exit(f"{folder}: neither {SIMULATED} nor {REAL}. Fix: run make proof or make proof-real")
+        sys.exit(
+            f"{folder}: none of {SIMULATED}, {SEA} and {REAL}. Fix: run make proof, make proof-sea or make proof-real"
+        )
     hidden = [] if REAL not in found else withheld.section(folder)
-    write_text(folder / PAGE, joint_page(found.get(SIMULATED), found.get(REAL), hidden))
+    write_text(folder / PAGE, joint_page(found.get(SIMULATED), found.get(REAL), hidden, found.get(SEA)))
     stamp(folder / PAGE)
 
 
-def joint_page(simulated: Result | None, real: Result | None, hidden: Sequence[str] = ()) -> str:
-    """Return the page of two results of `ferryid prove`, either of which may be None, with the section on what was withheld."""
-    halves = [
-        *([] if simulated is None else [Half.of_trials(simulated)]),
-        *([] if real is None else [Half.of_recordings(real)]),
+def joint_page(
+    simulated: Result | None, real: Result | None, hidden: Sequence[str] = (), sea: Result | None = None
+) -> str:
+    """Return the page of results of `ferryid prove`, any of which may be None, with the section on what was withheld."""
+    parts = [
+        *([] if simulated is None else [Part.of_trials(simulated)]),
+        *([] if sea is None else [Part.of_campaigns(sea)]),
+        *([] if real is None else [Part.of_recordings(real)]),
     ]
-    answered = [(question, [f"{one.name}: {one.answers[question]}" for one in halves]) for question in QUESTIONS]
+    answered = [(question, [f"{one.name}: {one.answers[question]}" for one in parts]) for question in QUESTIONS]
     lines = [
         "# Proof: what `ferryid diagnose` finds of effects that were concealed from it",
         "",
-        *(f"- **{question}** {'; '.join(parts)}." for question, parts in answered),
+        *(f"- **{question}** {'; '.join(said)}." for question, said in answered),
         f"- **How could I check it?** {CHECK}",
         "",
         SIDE_BY_SIDE,
-        *_rows(halves),
+        *_rows(parts),
         *(["", *hidden] if hidden else []),
-        *_rivals(halves),
+        *_rivals(parts),
     ]
-    for one in halves:
+    for one in parts:
         lines += ["", re.sub(r"^#", "##", one.text, flags=re.MULTILINE).strip()]
     return "\n".join(lines) + "\n"
 
 
 @dataclass(frozen=True)
-class Half:
-    """One of the two proofs.
+class Part:
+    """One of the proofs.
 
     Attributes
     ----------
@@ -97,7 +104,7 @@ class Half:
     rivals: Sequence[RivalScores] = ()
 
     @classmethod
-    def of_trials(cls, result: Result) -> Half:
+    def of_trials(cls, result: Result) -> Part:
         """Return that of simulated trials."""
         scores = Scores.from_json(result["scores"])
         clean = sum(one.runs for one in scores.cells if one.kind == "clean")
@@ -105,17 +112,10 @@ class Half:
         whole = Share(sum(one.count for one in every), sum(one.of for one in every))
         twice = [_from_twice(one) for one in scores.detections]
         far = Share(sum(one.count for one in twice), sum(one.of for one in twice))
-        many = right = wrong = ""
-        if scores.sea is not None:
-            many = (
-                f", and {counted(len(scores.sea.campaigns), 'campaign')} of {SEA_LOGS} logs that look like those at sea"
-            )
-            right = f"; at sea {scores.sea.named_from_twice.text} from twice what the oracle sees on"
-            wrong = f"; at sea in {scores.sea.false.text}"
         said = (
-            f"{counted(scores.runs, 'trial')}, {clean} of them without an effect{many}",
-            f"{whole.text} of all sizes, invisible ones among them; {far.text} from twice the oracle's size on{right}",
-            f"a name that is not in the trial in {scores.false_names['all'].text}{wrong}",
+            f"{counted(scores.runs, 'trial')}, {clean} of them without an effect",
+            f"{whole.text} of all sizes, invisible ones among them; {far.text} from twice the oracle's size on",
+            f"a name that is not in the trial in {scores.false_names['all'].text}",
             ON_TRIALS,
             _sources(result),
         )
@@ -126,7 +126,24 @@ class Half:
         return cls("simulated", dict(zip(QUESTIONS, said, strict=True)), page(result, scores), cells, scores.rivals)
 
     @classmethod
-    def of_recordings(cls, result: Result) -> Half:
+    def of_campaigns(cls, result: Result) -> Part:
+        """Return that of simulated campaigns at sea."""
+        scores = Scores.from_json(result["scores"])
+        sea = scores.sea
+        assert sea is not None, "a run of campaigns at sea has scores of them"
+        plain = sum(not one.effect for one in sea.campaigns)
+        said = (
+            f"{counted(len(sea.campaigns), 'campaign')} of {SEA_LOGS} logs, {plain} of them with the wind alone",
+            f"{sea.named.text} of all sizes; {sea.named_from_twice.text} from twice what the oracle sees on; of the winds of "
+            f"the day {sea.winds_from_twice.text}",
+            f"a name that is not in the logs in {sea.false.text}",
+            ON_CAMPAIGNS,
+            _sources(result),
+        )
+        return cls("at sea, simulated", dict(zip(QUESTIONS, said, strict=True)), page(result, scores), {})
+
+    @classmethod
+    def of_recordings(cls, result: Result) -> Part:
         """Return that of real recordings."""
         scores = RecordedScores.from_json(result["scores"])
         plain = len(scores.unaltered)
@@ -160,9 +177,11 @@ WHY: Mapping[str, str] = tomllib.loads((Path(__file__).parent / "why.toml").read
 ON_TRIALS = (
     "a plant of six degrees of freedom, which shares no formula with the hypotheses, three vessels and a controller"
 )
+ON_CAMPAIGNS = "the same plant in logs of one to five minutes, without a hull model, with a receiver that lags, gaps and an unsteady wind"
 CHECK = (
-    "`ferryid prove --check reports/proof` and `--check reports/proof-real` hash the published answers against the "
-    "commitments made before the first diagnosis; `make proof` and `make proof-real` repeat the draws, `SEED=N` draws others."
+    "`ferryid prove --check reports/proof`, `--check reports/proof-sea` and `--check reports/proof-real` hash the published "
+    "answers against the commitments made before the first diagnosis; `make proof proof-sea proof-real` repeats the draws, "
+    "`SEED=N` draws others."
 )
 SIDE_BY_SIDE = """## Side by side
 
@@ -194,15 +213,15 @@ method names in the altered one and not in the recording as it was.
 |---|---|--:|--:|--:|--:|--:|--:|"""
 
 
-def _rivals(halves: Sequence[Half]) -> list[str]:
+def _rivals(parts: Sequence[Part]) -> list[str]:
     """Return the section on rivals; nothing where none were run."""
     rows = []
-    for half in halves:
-        for one in half.rivals:
+    for part in parts:
+        for one in part.rivals:
             name = "ferryid" if one.name == DIAGNOSED else one.name
             error = "" if one.median_error is None else f"{100.0 * one.median_error:.0f} % of {one.parameters}"
             cells = (one.right.text, one.able.text, one.wrong.text, error, f"{one.seconds:.0f}", str(one.refused))
-            rows.append(f"| {half.name} | {name} | {' | '.join(cells)} |")
+            rows.append(f"| {part.name} | {name} | {' | '.join(cells)} |")
     return ["", RIVALS, *rows] if rows else []
 
 
@@ -221,9 +240,9 @@ def _from_twice(one: Detection) -> Share:
     return Share(sum(flags), len(flags))
 
 
-def _rows(halves: Sequence[Half]) -> list[str]:
+def _rows(parts: Sequence[Part]) -> list[str]:
     """Return a row for each effect that either has."""
-    cells = {one.name: one.cells for one in halves}
+    cells = {one.name: one.cells for one in parts}
     simulated, real = cells.get("simulated", {}), cells.get("real recordings", {})
     return [
         f"| {effect} | {' | '.join((*simulated.get(effect, ('', '', '')), *real.get(effect, ('', ''))))} | {why} |"

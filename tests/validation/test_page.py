@@ -113,8 +113,11 @@ def test_campaigns_at_sea_have_a_section_of_their_own() -> None:
         campaign((OF_THE_DAY,), [], {}, 0.0),
     ]
     text = page(RESULT, score(every))
-    assert "## At sea" in text
-    assert "and 2 campaigns of 10 logs." in text
+    assert "# Validation at sea: " in text
+    assert "Written by `ferryid prove --seed 5 --runs 4`: 2 campaigns of 10 logs." in text
+    both = page(RESULT, score([*every, result([], [], "clean", "clean")]))
+    assert "## At sea" in both
+    assert ": 1 logs, 4 of each size of each effect, and 2 campaigns of 10 logs." in both
     (row,) = (line for line in text.splitlines() if line.startswith("| current | 0.1 m/s |"))
     assert row.endswith("| yes | 0.0 | no |  |")
     assert "| at sea, campaigns with a wrong name: at most 1 %; 0.0 % (0/2)" in text
