@@ -177,7 +177,7 @@ WHY: Mapping[str, str] = tomllib.loads((Path(__file__).parent / "why.toml").read
 ON_TRIALS = (
     "a plant of six degrees of freedom, which shares no formula with the hypotheses, three vessels and a controller"
 )
-ON_CAMPAIGNS = "the same plant in logs of one to five minutes, without a hull model, with a receiver that lags, gaps and an unsteady wind"
+ON_CAMPAIGNS = "the same plant in logs of minutes, no hull model, a receiver that lags, gaps and an unsteady wind"
 CHECK = (
     "`ferryid prove --check reports/proof`, `--check reports/proof-sea` and `--check reports/proof-real` hash the published "
     "answers against the commitments made before the first diagnosis; `make proof proof-sea proof-real` repeats the draws, "
