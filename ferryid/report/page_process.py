@@ -61,7 +61,11 @@ class PageProcess:
 
         if sum(len(log.motion.t) for log in result.logs) > MOST_ROWS or self._process.stdout is None:
             return None
-        if not self._write(pickle.dumps((result, folder, out, tuple(command)), protocol=5)):
+        try:
+            request = pickle.dumps((result, folder, out, tuple(command)), protocol=5)
+        except (pickle.PicklingError, TypeError, AttributeError):  # something in it that is a process's own
+            return None
+        if not self._write(request):
             return None
         try:
             page: Page = pickle.load(self._process.stdout)

@@ -39,7 +39,9 @@ from ferryid.validation.records import OracleEstimate, OracleResult
 from ferryid.vessel.profile import Profile
 
 
-def oracle(log: str, profile: Profile, truths: Sequence[Truth]) -> OracleResult:
+def oracle(
+    log: str, profile: Profile, truths: Sequence[Truth], *, fewest_windows: int = INFERENCE.fewest_windows
+) -> OracleResult:
     """Return the gain and size of effects that are known to be in a log.
 
     Parameters
@@ -50,6 +52,8 @@ def oracle(log: str, profile: Profile, truths: Sequence[Truth]) -> OracleResult:
         The vessel, as the diagnosis is given it.
     truths
         What is in the log: effects, instances and times are used, values never.
+    fewest_windows
+        Of which forces can be estimated.
 
     Raises
     ------
@@ -58,7 +62,8 @@ def oracle(log: str, profile: Profile, truths: Sequence[Truth]) -> OracleResult:
     """
     start = time.perf_counter()
     _check(profile, truths)
-    return replace(_estimates(_Log(read_measurements(log, profile)[0]), truths), seconds=time.perf_counter() - start)
+    made = _estimates(_Log(read_measurements(log, profile)[0], fewest_windows), truths)
+    return replace(made, seconds=time.perf_counter() - start)
 
 
 def oracle_of_each(log: str, profile: Profile, truths: Sequence[Truth]) -> OracleResult:
@@ -91,6 +96,7 @@ class _Log:
     """A log in which several effects may be estimated."""
 
     measurements: Measurements
+    fewest_windows: int = INFERENCE.fewest_windows
 
     @cached_property
     def windows(self) -> Windows:
@@ -106,7 +112,7 @@ class _Log:
     def too_short(self) -> str:
         """Why nothing can be fitted; empty where it can."""
         found = len(self.windows.starts)
-        return f"only {counted(found, 'stretch')} without a gap" if found < INFERENCE.fewest_windows else ""
+        return f"only {counted(found, 'stretch')} without a gap" if found < self.fewest_windows else ""
 
 
 def _sensor_oracles() -> dict[str, Callable[[Measurements], SensorEstimate]]:
@@ -155,7 +161,7 @@ def _estimates(log: _Log, truths: Sequence[Truth]) -> OracleResult:
         total += one.gain
         measurements = one.correct(measurements) if sure else measurements
     if forces:
-        right = log if measurements is log.measurements else _Log(refilter_velocity(measurements))
+        right = log if measurements is log.measurements else _Log(refilter_velocity(measurements), log.fewest_windows)
         gain, recovered = _of_forces(right, forces)
         total += gain
         for made in recovered:

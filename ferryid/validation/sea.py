@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.effects import effects
 from ferryid.simulate.sensors import Stream
 from ferryid.types import Floats
 from ferryid.validation.case import Case
@@ -78,9 +79,9 @@ def realised_at_sea(case: Case) -> dict[str, dict[str, float]]:
     The wind of a log is the mean of what blew in it. What a trial measures of an effect that is in a log is that log's; of a
     property of the vessel it is the mean over the logs. A delay is found together with the lag of the receiver.
     """
-    effects, concealed = plant_effects(), {truth.effect for truth in case.truths}
+    concealed = {truth.effect for truth in case.truths}
     found: dict[str, dict[str, float]] = {}
-    measured = [effects[name] for name in sorted(concealed) if effects[name].realised is not None]
+    measured = [plant_effects()[name] for name in sorted(concealed) if plant_effects()[name].realised is not None]
     for number in range(case.logs):
         north, east = _air(case, number).mean(axis=0).tolist()
         found[f"wind {number}"] = {"north": north, "east": east}
@@ -89,10 +90,11 @@ def realised_at_sea(case: Case) -> dict[str, dict[str, float]]:
             values = one.realised(trial, _conditions(case, number)) if one.realised is not None and trial else {}
             if values:
                 found[f"{one.id} {number}"] = dict(values)
-    for name in concealed:
-        logs = [values for key, values in found.items() if key.rpartition(" ")[0] == name]
-        if logs:
-            found[name] = {key: float(np.mean([one[key] for one in logs])) for key in logs[0]}
+    lasting = {name for name in concealed if name in effects() and effects()[name].vessel}
+    for name in sorted(lasting):
+        logs = [found.pop(f"{name} {number}", {}) for number in range(case.logs)]
+        if any(logs):
+            found[name] = {key: float(np.mean([one[key] for one in logs if one])) for key in next(filter(None, logs))}
     for truth in case.truths:
         if truth.effect == "time_delay":
             found[truth.effect] = {name: value + receiver_lag_s(case) for name, value in truth.values.items()}

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ferryid.json_record import Record
-from ferryid.validation.campaign_oracle import deviation
+from ferryid.validation.campaign_oracle import deviation, visible
 from ferryid.validation.case import Truth
 from ferryid.validation.estimate_errors import EstimateErrors, estimate_errors
 from ferryid.validation.name_scores import Share, names, wrong_names
-from ferryid.validation.recorded.kinematic_sizes import SIGMAS
 from ferryid.validation.records import CaseResult
 
 SEA = "sea"
@@ -107,7 +106,7 @@ def _campaign(result: CaseResult) -> SeaCampaign:
 def _seen(result: CaseResult, truth: Truth) -> float:
     every = () if result.oracle is None else result.oracle.recovered
     one = next((one for one in every if one.key == truth.key and not one.idle), None)
-    return 0.0 if one is None else deviation(one) / SIGMAS
+    return 0.0 if one is None else deviation(one) / visible(one.free)
 
 
 def _share(flags: Sequence[bool]) -> Share:

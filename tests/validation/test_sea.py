@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.data.estimate import Estimate
-from ferryid.validation.campaign_oracle import deviation
+from ferryid.errors import FerryIdError
+from ferryid.validation import campaign_oracle as campaigns
+from ferryid.validation.campaign_oracle import campaign_oracle, deviation, visible
 from ferryid.validation.case import Case, Truth
 from ferryid.validation.case_sampling import CLEAN_SEA, NOT_AT_SEA, SEA_LOGS, sample_cases
 from ferryid.validation.log_generation import generate, profile_with_hull
@@ -144,6 +146,45 @@ def test_the_oracles_deviation_has_no_bias() -> None:
     assert np.mean(found) == pytest.approx(25.0, rel=0.02)
 
 
+def test_what_an_oracle_sees_of_one_parameter_is_seen_by_a_normal_test_too() -> None:
+    assert visible(1) == pytest.approx(SIGMAS, rel=1e-3)
+    # Twenty parameters give chance more room.
+    assert visible(20) > 1.4 * visible(1)
+
+
+def test_the_oracles_of_the_logs_are_added_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+
+    def of_log(log: str, profile: Any, truths: Any, *, fewest_windows: int) -> OracleResult:
+        asked.append((log, [one.effect for one in truths]))
+        if log == "c":
+            raise FerryIdError("too short")
+        return OracleResult(9.0, tuple(OracleEstimate(one.effect, None, 3.0, 2, 1.0) for one in truths), 1.0)
+
+    monkeypatch.setattr(campaigns, "oracle", of_log)
+    profile: Any = None
+    found = campaign_oracle(["a", "b", "c", "d"], profile, (DRAG, WIND), first_log=1)
+    assert asked == [
+        ("a", ["wind"]),
+        ("b", ["current", "wind"]),
+        ("c", ["current", "wind"]),
+        ("d", ["current", "wind"]),
+    ]
+    assert [(one.effect, one.gain, one.free) for one in found.recovered] == [("current", 6.0, 4), ("wind", 9.0, 6)]
+    # Where the effect is in no log that can be used, there is no gain.
+    (current, _) = campaign_oracle(["a", "c"], profile, (DRAG, WIND), first_log=1).recovered
+    assert (current.gain, bool(current.cannot)) == (0.0, True)
+    with pytest.raises(FerryIdError, match="too short"):
+        campaign_oracle(["c"], profile, (WIND,))
+
+
+def test_a_property_is_the_mean_over_the_logs_and_waves_are_those_of_each() -> None:
+    loss = realised_at_sea(replace(case("sea: thrust_inflow_loss"), logs=2))
+    assert set(loss) == {"wind 0", "wind 1", "thrust_inflow_loss"}
+    waves = realised_at_sea(replace(case("sea: waves"), logs=2))
+    assert set(waves) == {"wind 0", "wind 1", "waves 0", "waves 1"}
+
+
 def test_a_campaigns_finding_is_that_of_the_log_of_middle_probability() -> None:
     def one(probability: float, north: float) -> dict[str, Any]:
         found = {"effect": "wind", "instance": None, "probability": probability, "parameters": {"north": north}}
@@ -170,7 +211,7 @@ def found(effect: str, log: int, **values: float) -> Finding:
 
 
 def test_campaigns_are_scored_apart_from_what_an_oracle_sees_twice_on() -> None:
-    twice = 0.5 * ((2.0 * SIGMAS) ** 2 + 2.0) + 1e-6
+    twice = 0.5 * ((2.0 * visible(2)) ** 2 + 2.0) + 1e-6
     wind = found("wind", 3, north=2.0, east=4.0)
     every = [
         result((DRAG, WIND), [wind, found("current", 0, north=0.1, east=0.0)], {"current": twice, "wind": twice}, 0.1),

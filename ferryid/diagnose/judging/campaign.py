@@ -108,17 +108,21 @@ def judge_campaign(campaign: Campaign, place: Mapping[str, int], progress: Calla
     """Judge what several logs say together: conditions, then properties beside them, then conditions beside these."""
     conditions = judge_conditions(campaign, place, progress)
     properties = judge_properties(conditions.hull.fit, progress)
-    confirmed = tuple(_begun(one) for one in properties if one.confirmed)
-    if confirmed:
+    alone, confirmed = conditions, tuple(_begun(one) for one in properties if one.confirmed)
+    while confirmed:
         conditions = judge_conditions(replace(campaign, properties=confirmed), place, progress)
-        made = conditions.hull.fit
-        again = {one.key: tested(made, one, ()) for one in made.campaign.properties}
-        found = (
+        again = {one.key: tested(conditions.hull.fit, one, ()) for one in confirmed}
+        held = tuple(one for one in confirmed if again[one.key].evidence >= INFERENCE.prior_odds)
+        # What the evidence does not speak for beside the conditions is no hint either, and acts no longer.
+        gone = {one.key for one in confirmed} - {one.key for one in held}
+        properties = tuple(
             replace(again[one.candidate.key], rivals=one.rivals) if one.candidate.key in again else one
             for one in properties
+            if one.candidate.key not in gone
         )
-        # What the evidence does not speak for beside the conditions is no hint either.
-        properties = tuple(one for one in found if one.evidence >= INFERENCE.prior_odds)
+        if not gone:
+            break
+        confirmed, conditions = held, alone
     return JudgedCampaign(conditions, properties, *_without_confirmed(conditions))
 
 

@@ -108,6 +108,8 @@ class ConditionTest:
         Other conditions that held-out data confirm as well in its place, and that are hardly less likely.
     outdone
         Other conditions that cannot be true, as they stand on headings that the vessel did not have, and have more evidence.
+    alone
+        Its evidence over none without the conditions beside which it is tested [nat]; None where there are none.
     """
 
     effect: str
@@ -119,6 +121,12 @@ class ConditionTest:
     placebos: Mapping[str, PlaceboTest]
     unresolved: tuple[str, ...] = ()
     outdone: tuple[str, ...] = ()
+    alone: float | None = None
+
+    @property
+    def evidence_alone(self) -> float:
+        """Evidence over none of it by itself, by which conditions are weighed against each other [nat]."""
+        return self.evidence if self.alone is None else self.alone
 
     @property
     def place(self) -> int:
@@ -257,12 +265,15 @@ def judge_conditions(campaign: Campaign, place: Mapping[str, int], progress: Cal
             # The first may have hidden it: what a condition leaves to explain looks like another one turned round.
             progress(f"estimating a {effects()[other.effect].title.lower()} of every log beside what is confirmed")
             seen = _against_others(_tested(both, other.effect, progress), campaign, progress)
-            made, beside[other.effect] = (seen.fit if seen.confirmed else None), seen
+            made, beside[other.effect] = (seen.fit if seen.confirmed else None), replace(seen, alone=other.evidence)
         if made is not None:
             kept, fit = [*kept, other], made
     if len(kept) > 1:
         # What is told of each is what it is beside the others, and each must hold there.
-        together = {one.effect: _tested(fit.campaign, one.effect, progress, made=fit) for one in kept}
+        together = {
+            one.effect: replace(_tested(fit.campaign, one.effect, progress, made=fit), alone=one.evidence)
+            for one in kept
+        }
         if all(one.confirmed for one in together.values()):
             left = [one for one in tests if one.effect in together or not one.confirmed]
             told = tuple(together.get(one.effect, beside.get(one.effect, one)) for one in left)
@@ -275,7 +286,9 @@ def judge_conditions(campaign: Campaign, place: Mapping[str, int], progress: Cal
         tests = [replace(one, unresolved=open_.get(one.effect, ())) for one in tests]
         return JudgedConditions(CommonHull(estimate_campaign(without_conditions(campaign)), place), tuple(tests))
     left = [one for one in tests if one is best or not one.confirmed]
-    return JudgedConditions(CommonHull(best.fit, place), tuple(beside.get(one.effect, one) for one in left))
+    # What holds beside the best, which does not hold beside it, is as open as it is by itself.
+    seen_beside = {effect: one for effect, one in beside.items() if not one.confirmed}
+    return JudgedConditions(CommonHull(best.fit, place), tuple(seen_beside.get(one.effect, one) for one in left))
 
 
 def _beside(fit: CampaignFit, both: Campaign) -> CampaignFit | None:
@@ -367,7 +380,7 @@ def _finding(test: ConditionTest, i: int, tests: tuple[ConditionTest, ...]) -> F
         mse=errors.mse,
         held_out=True,
         rivals=tuple(
-            Rival(one.effect, None, one.evidence - test.evidence)
+            Rival(one.effect, None, one.evidence_alone - test.evidence_alone)
             for one in tests
             if one.effect not in (test.effect, *test.beside)
         ),

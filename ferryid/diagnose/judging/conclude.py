@@ -148,11 +148,11 @@ def _too_short(
     figures = replace(shared, joint=baseline.joint, baseline_sensors=baseline.sensors, setting=setting)
     findings, notes = apply_rules(claims, figures)
     profile, window_s = screened.measurements.profile, _window_s(log.windows.weight, log.windows.measurements.step_s)
-    # Bags of seconds are welcome in a campaign, which needs no longer ones.
+    # Bags of seconds are welcome in a campaign that they have a say in.
     advice = (
         TEN_MINUTES.get(setting, TEN_MINUTES[""])
-        if together is None
-        else "What all logs say together holds for it too."
+        if together is None or log.path not in together.hull.place
+        else "What all logs say together of hull and properties holds for it too."
     )
     short = f"Only {counted(len(log.windows.starts), 'stretch')} of {window_s:.0f} s without a gap: too few for a conclusion "
     short += f"from this log alone. {advice}"

@@ -249,6 +249,31 @@ def test_two_conditions_that_are_confirmed_alike_are_hints(monkeypatch: pytest.M
     assert [(one.effect, one.confirmed) for one in judged.tests] == [("wind", True)]
 
 
+def test_what_holds_beside_a_condition_that_does_not_hold_beside_it_stays_open(monkeypatch: pytest.MonkeyPatch) -> None:
+    (wind,) = judge_conditions(campaign(), {"a": 0, "b": 1, "c": 2}, no_progress).tests
+    both = campaign(conditions=("wind", "current"))
+    together, stream = estimate_campaign(both), estimate_campaign(campaign(conditions=("current",)))
+
+    def tested(logs: Campaign, name: str, _: object, **_given: object) -> ConditionTest:
+        alone = len(logs.conditions) == 1
+        found = replace(wind, effect=name, fit={"wind": wind.fit, "current": stream}[name] if alone else together)
+        # A current is confirmed alone, a wind beside it, and the current not beside the wind.
+        confirmed = alone if name == "current" else not alone
+        return found if confirmed else replace(found, evidence=wind.evidence - 5.0, placebos={})
+
+    monkeypatch.setattr(campaign_conditions, "_tested", tested)
+    monkeypatch.setattr(campaign_conditions, "_against_others", lambda one, *_: one)
+    judged = judge_conditions(both, {"a": 0, "b": 1, "c": 2}, no_progress)
+    assert [(one.effect, one.confirmed, one.beside) for one in judged.tests] == [
+        ("current", True, ()),
+        ("wind", False, ()),
+    ]
+    assert [one.effect.id for one in judged.hull.fit.campaign.conditions] == ["current"]
+    (claim,) = judged.claims("a")
+    # Conditions are weighed against each other by what each explains by itself.
+    assert [(one.effect, one.delta_score) for one in claim.finding.rivals] == [("wind", pytest.approx(-5.0))]
+
+
 def test_references_that_measured_what_a_log_did_not_have_no_conditions() -> None:
     first, second, third = campaign(conditions=("wind", "current")).members
     measured = replace(second, conditions=(CURRENT,))

@@ -102,6 +102,9 @@ def test_what_the_evidence_does_not_speak_for_beside_conditions_is_no_hint(monke
     judged = judge_campaign(whole, places, no_progress)
     assert judged.properties == ()
     assert judged.claims("0") == ()
+    # Nor does it act unseen in the hull that the logs are compared with.
+    assert judged.hull.fit.campaign.properties == ()
+    assert judged.force_models("0") is None
 
 
 def test_scores_rank_as_fits_do() -> None:
