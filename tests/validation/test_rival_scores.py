@@ -20,7 +20,7 @@ from ferryid.validation.rival_scores import as_it_is, rival_scores
 from ferryid.validation.rivals import naming, output_error
 from ferryid.validation.rivals.learner import LearnedModel
 from ferryid.vessel import load_profile
-from tests.proof.__main__ import Half, _rivals
+from tests.proof.__main__ import Part, _rivals
 from tests.validation.two_logs import two_logs
 
 FERRY = load_profile("milliampere")
@@ -80,11 +80,11 @@ def test_in_a_recording_counts_what_the_recording_as_it_was_does_not_show() -> N
 
 def test_the_page_has_a_row_for_each_method() -> None:
     results = [case("0", LOSS, finding("thruster_gain", "thruster1", factor=0.78), {"stepwise": None})]
-    half = Half("simulated", {}, "", {}, rival_scores(results, as_it_is))
-    lines = _rivals([half])
+    part = Part("simulated", {}, "", {}, rival_scores(results, as_it_is))
+    lines = _rivals([part])
     assert [line.split("|")[2].strip() for line in lines[2:]] == ["ferryid", "stepwise"]
     assert "| 10 % of 1 |" in lines[2]
-    assert _rivals([replace(half, rivals=())]) == []
+    assert _rivals([replace(part, rivals=())]) == []
 
 
 def test_a_chosen_term_names_its_effect_with_the_size_of_its_coefficient(monkeypatch: pytest.MonkeyPatch) -> None:
