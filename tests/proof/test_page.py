@@ -9,7 +9,7 @@ import pytest
 
 from ferryid.validation.plant.effects import plant_effects
 from ferryid.validation.recorded.effects import concealments
-from tests.proof.__main__ import PAGE, QUESTIONS, REAL, REPORTS, SIMULATED, WHY, joint_page, main
+from tests.proof.__main__ import PAGE, QUESTIONS, REAL, REPORTS, SEA, SIMULATED, WHY, joint_page, main
 
 
 def stored(name: str) -> dict[str, object]:
@@ -38,6 +38,17 @@ def test_either_half_is_written_without_the_other(name: str, tmp_path: Path) -> 
     assert ("real recordings: " in text) == (name == REAL)
     assert text.count("\n# ") + text.startswith("# ") == 1
     assert f"({name.removesuffix('.json')}/errors.svg)" in text
+
+
+def test_campaigns_at_sea_are_a_part_of_their_own() -> None:
+    text = joint_page(stored(SIMULATED), None, sea=stored(SEA))
+    lines = [line for line in text.splitlines()[:10] if line.startswith("- **")]
+    for question, line in zip(QUESTIONS, lines, strict=False):
+        assert f"**{question}**" in line
+        assert "simulated: " in line
+        assert "at sea, simulated: " in line
+    assert f"`{stored(SEA)['sources']}`" in "".join(lines)
+    assert "## Validation at sea: " in text
 
 
 def test_a_folder_without_results_is_refused(tmp_path: Path) -> None:
