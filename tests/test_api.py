@@ -6,6 +6,7 @@ import ast
 import inspect
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -94,6 +95,15 @@ def test_what_cannot_be_used_is_refused_as_by_the_commands(tmp_path: Path) -> No
     with pytest.raises(FerryIdError, match="no such file or folder"):
         api.fit(tmp_path / "missing.mcap", "milliampere", out=tmp_path)
     assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("vessel", [None, "milliampere"])
+def test_a_call_without_a_log_is_refused(vessel: str | None, tmp_path: Path) -> None:
+    calls = (api.fit, partial(api.sweep, "components"), api.diagnose)
+    for call in calls:
+        with pytest.raises(FerryIdError, match=r"no log was given\. Fix: name one"):
+            call([], vessel=vessel, out=tmp_path)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_session_shows_one_line_of_a_result() -> None:

@@ -39,6 +39,14 @@ def paths_of(logs: Logs) -> list[str]:
     return [path for log in named for path in local_logs(log)]
 
 
+def refuse_no_logs(logs: Sequence[str]) -> None:
+    """Refuse a call that reads logs and was given none."""
+    if not logs:
+        from ferryid.errors import FerryIdError
+
+        raise FerryIdError("no log was given. Fix: name one or more, as a path or a list of paths")
+
+
 def path_of(log: str | Path) -> str:
     """Return a single log as a path."""
     paths = paths_of(log)
@@ -70,6 +78,7 @@ def chosen_vessel(logs: Sequence[str], vessel: str | Path | Profile | None, anno
     """Return the vessel of logs, and announce which one was found where it was not asked for."""
     from ferryid.vessel import choose_vessel
 
+    refuse_no_logs(logs)
     choice = choose_vessel(logs, vessel)
     announced(choice, announce)
     return choice.profile

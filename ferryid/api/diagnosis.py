@@ -17,6 +17,7 @@ from ferryid.api.arguments import (
     paths_of,
     profile_of,
     quiet,
+    refuse_no_logs,
     run_context,
     vessel_beside_model,
 )
@@ -131,6 +132,7 @@ def _examined(
     from ferryid.diagnose import DiagnosisSettings
     from ferryid.report.diagnosis_report import patient
 
+    refuse_no_logs(logs)
     if not model:
         vessel = chosen_vessel(logs, vessel, announce)
     elif not vessel:

@@ -17,6 +17,7 @@ from ferryid.api.arguments import (
     paths_of,
     profile_of,
     quiet,
+    refuse_no_logs,
     refuse_ranges_of_archive,
     run_context,
     vessel_beside_model,
@@ -114,6 +115,7 @@ def evaluate(
     from ferryid.report.evaluation_text import render_evaluation
 
     run, judged, paths = run_context(out, progress, ranges=ranges), model_of(model, Path(out)), paths_of(logs)
+    refuse_no_logs(paths)
     profile = vessel_beside_model(judged, paths, vessel, announce)
     result = evaluate_model(judged, paths, run, profile=profile, window_s=window_s)
     return outcome_of(result, render_evaluation(result))

@@ -121,6 +121,9 @@ def test_campaigns_at_sea_have_a_section_of_their_own() -> None:
     (row,) = (line for line in text.splitlines() if line.startswith("| current | 0.1 m/s |"))
     assert row.endswith("| yes | 0.0 | no |  |")
     assert "| at sea, campaigns with a wrong name: at most 1 %; 0.0 % (0/2)" in text
+    # Nothing is said of single logs where there are none.
+    assert "| clean logs with a wrong name" not in text
+    assert "Allowed is `hull_parameters`" not in text
     # No trial: no table of names.
     assert "## Names by cell" not in text
     assert "confusion.svg" not in text

@@ -162,17 +162,23 @@ class CampaignFit:
         return self.campaign.force_model(i, self.common, self.own[i])
 
     @property
+    def cost(self) -> float:
+        """Squares of the whitened gaps and of what is estimated in units of its belief: twice the negative log posterior."""
+        precision = self.campaign.own_precision(self.spreads)
+        squares = [
+            float(np.sum(part.gaps**2) + own @ (precision * own))
+            for own, part in zip(self.own, self.parts, strict=True)
+        ]
+        return float(self.common @ self.common) + sum(squares)
+
+    @property
     def evidence(self) -> float:
         """Logarithm of the evidence (Laplace), but for what only the noise decides."""
-        cost = float(self.common @ self.common)
         precision = self.campaign.own_precision(self.spreads)
-        logarithm = 0.0
-        for own, part, Q in zip(self.own, self.parts, self.normal.own, strict=True):
-            cost += float(np.sum(part.gaps**2) + own @ (precision * own))
-            logarithm += float(np.linalg.slogdet(Q)[1] - np.sum(np.log(precision)))
+        logarithm = sum(float(np.linalg.slogdet(Q)[1] - np.sum(np.log(precision))) for Q in self.normal.own)
         A = np.eye(self.campaign.g) + np.sum(self.normal.matrices, axis=0)
         rarity = sum(one.log_alternatives for one in (*self.campaign.conditions, *self.campaign.properties))
-        return -0.5 * cost - 0.5 * logarithm - 0.5 * float(np.linalg.slogdet(A)[1]) - rarity
+        return -0.5 * self.cost - 0.5 * logarithm - 0.5 * float(np.linalg.slogdet(A)[1]) - rarity
 
 
 @dataclass(frozen=True)
@@ -236,7 +242,11 @@ class _Eliminated:
 
 
 def estimate_campaign(
-    campaign: Campaign, *, noise: CampaignNoise | None = None, begin: CampaignFit | None = None
+    campaign: Campaign,
+    *,
+    noise: CampaignNoise | None = None,
+    begin: CampaignFit | None = None,
+    bare: CampaignFit | None = None,
 ) -> CampaignFit:
     """Estimate what several logs say together.
 
@@ -248,11 +258,13 @@ def estimate_campaign(
         What is left over; estimated where None. Two hypotheses are compared under one noise.
     begin
         An estimate of the same conditions and properties, to begin with and to take the spreads from.
+    bare
+        The estimate of `bare_campaign`, from which a search for conditions begins; made where None.
     """
     if begin is not None:
         at = _point(campaign, begin.common, begin.own)
         return _settled(campaign, at, begin.spreads, noise, known_spreads=True)
-    spreads, at = _first(campaign)
+    spreads, at = _first(campaign, bare)
     made = _settled(campaign, at, spreads, noise)
     for _ in range(SEARCHES):
         own = _elsewhere(made) if campaign.own else None
@@ -394,7 +406,12 @@ def _gap(campaign: Campaign, common: Floats, own: Floats, i: int) -> Floats:
     return campaign.gap(i, common, own[i])
 
 
-def _first(campaign: Campaign) -> tuple[Spreads, _Point]:
+def bare_campaign(campaign: Campaign) -> Campaign:
+    """Return the logs with a hull alone, without conditions and properties."""
+    return replace(campaign, members=tuple(replace(one, conditions=()) for one in campaign.members), properties=())
+
+
+def _first(campaign: Campaign, bare: CampaignFit | None) -> tuple[Spreads, _Point]:
     """Return spreads and estimates to begin with: the hull without conditions, then what explains most beside it."""
     common, own = np.zeros(campaign.g), np.zeros((len(campaign.members), campaign.l))
     # Some properties, such as a dead band, have no slope where they do not act.
@@ -405,8 +422,7 @@ def _first(campaign: Campaign) -> tuple[Spreads, _Point]:
     spreads = Spreads((1.0,) * len(campaign.conditions), np.maximum(steady, 1e-12))
     if not campaign.own:
         return spreads, _point(campaign, common, own)
-    bare = replace(campaign, members=tuple(replace(one, conditions=()) for one in campaign.members), properties=())
-    made = estimate_campaign(bare)
+    made = estimate_campaign(bare_campaign(campaign)) if bare is None else bare
     h = len(campaign.hull.mean)
     common[:h] = made.common[:h]
     own[:, -3:] = made.own

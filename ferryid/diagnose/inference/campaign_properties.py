@@ -11,7 +11,7 @@ Rao (1948), Large sample tests of statistical hypotheses concerning several para
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -41,6 +41,25 @@ class ScoredProperty:
     fit: CampaignFit
     gain: float
 
+    def over(self, other: ScoredProperty) -> float:
+        """Return the log odds over another, estimated under the same noise [nat].
+
+        An effect has as many parameters on one actuator as on another. Where nobody has modelled the hull, all of its
+        coefficients grow with the force of the actuators, and with them the volume that the evidence counts: then what
+        either leaves, and asks of the hull, decides between the two.
+        """
+        if self.fit.campaign.hull.known or not self.same_effect(other):
+            return self.gain - other.gain
+        return 0.5 * (other.fit.cost - self.fit.cost)
+
+    def same_effect(self, other: ScoredProperty) -> bool:
+        """Return whether it is the same effect of another actuator."""
+        return self.candidate.effect.id == other.candidate.effect.id
+
+
+Rivals = Mapping[tuple[str, str | None], tuple[tuple[Candidate, float], ...]]
+"""Of each property that was selected, by its key: what was tried in its place, with the log odds over it [nat]."""
+
 
 def properties_of(campaign: Campaign) -> list[Candidate]:
     """Return every lasting property that no log rules out and some log can show of the actuator.
@@ -62,11 +81,9 @@ def properties_of(campaign: Campaign) -> list[Candidate]:
     ]
 
 
-def select_properties(
-    made: CampaignFit, progress: Callable[[str], None]
-) -> tuple[CampaignFit, tuple[ScoredProperty, ...]]:
-    """Return the estimate with every property that the evidence speaks for, and the rivals of the last one of each round."""
-    rivals: list[ScoredProperty] = []
+def select_properties(made: CampaignFit, progress: Callable[[str], None]) -> tuple[CampaignFit, Rivals]:
+    """Return the estimate with every property that the evidence speaks for, and what was tried in the place of each."""
+    rivals: dict[tuple[str, str | None], tuple[tuple[Candidate, float], ...]] = {}
     while len(made.campaign.properties) < INFERENCE.most_effects:
         taken = {one.key for one in made.campaign.properties}
         left = [one for one in properties_of(made.campaign) if one.key not in taken]
@@ -79,10 +96,13 @@ def select_properties(
         if not found or found[0].gain < INFERENCE.prior_odds:
             break
         best = found[0]
-        rivals += found[1:]
+        for one in found[1:]:
+            if one.same_effect(best) and one.over(best) > 0.0:
+                best = one
+        rivals[best.candidate.key] = tuple((one.candidate, one.over(best)) for one in found if one is not best)
         # With what it explains gone, the noise is less; the spreads follow.
         made = estimate_campaign(best.fit.campaign, begin=best.fit)
-    return made, tuple(rivals)
+    return made, rivals
 
 
 def score(made: CampaignFit, candidate: Candidate) -> float:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from ferryid.diagnose.inference.campaign import CommonHull
-from ferryid.diagnose.inference.campaign_estimation import CampaignFit, estimate_campaign
+from ferryid.diagnose.inference.campaign_estimation import CampaignFit, bare_campaign, estimate_campaign
 from ferryid.diagnose.inference.campaign_model import Campaign
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.force_errors import mass_of
@@ -106,11 +106,12 @@ def _whole(made: CampaignFit, i: int) -> ForceModel:
 
 def judge_campaign(campaign: Campaign, place: Mapping[str, int], progress: Callable[[str], None]) -> JudgedCampaign:
     """Judge what several logs say together: conditions, then properties beside them, then conditions beside these."""
-    conditions = judge_conditions(campaign, place, progress)
+    bare = estimate_campaign(bare_campaign(campaign))
+    conditions = judge_conditions(campaign, place, progress, bare)
     properties = judge_properties(conditions.hull.fit, progress)
     alone, confirmed = conditions, tuple(_begun(one) for one in properties if one.confirmed)
     while confirmed:
-        conditions = judge_conditions(replace(campaign, properties=confirmed), place, progress)
+        conditions = judge_conditions(replace(campaign, properties=confirmed), place, progress, bare)
         again = {one.key: tested(conditions.hull.fit, one, ()) for one in confirmed}
         held = tuple(one for one in confirmed if again[one.key].evidence >= INFERENCE.prior_odds)
         # What the evidence does not speak for beside the conditions is no hint either, and acts no longer.

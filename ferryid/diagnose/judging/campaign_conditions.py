@@ -24,7 +24,7 @@ from ferryid.diagnose.data.course import Course
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.campaign import CommonHull
 from ferryid.diagnose.inference.campaign_course import estimate_courses
-from ferryid.diagnose.inference.campaign_estimation import CampaignFit, estimate_campaign
+from ferryid.diagnose.inference.campaign_estimation import CampaignFit, bare_campaign, estimate_campaign
 from ferryid.diagnose.inference.campaign_model import Campaign
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.campaign_errors import LogErrors
@@ -241,14 +241,20 @@ class JudgedConditions:
         )
 
 
-def judge_conditions(campaign: Campaign, place: Mapping[str, int], progress: Callable[[str], None]) -> JudgedConditions:
-    """Judge every condition that the logs may have, and return the hull with those that are confirmed."""
+def judge_conditions(
+    campaign: Campaign, place: Mapping[str, int], progress: Callable[[str], None], bare: CampaignFit | None = None
+) -> JudgedConditions:
+    """Judge every condition that the logs may have, and return the hull with those that are confirmed.
+
+    `bare` is the estimate of the hull alone, from which every search begins; it is made where None.
+    """
+    bare = estimate_campaign(bare_campaign(campaign)) if bare is None else bare
     names = sorted({one.effect.id for one in campaign.conditions})
     tests = []
     for name in names:
         progress(f"estimating one hull and a {effects()[name].title.lower()} of every log")
-        tests.append(_tested(with_conditions(campaign, frozenset([name])), name, progress))
-    tests = [_against_others(one, campaign, progress) if one.confirmed else one for one in tests]
+        tests.append(_tested(with_conditions(campaign, frozenset([name])), name, progress, bare))
+    tests = [_against_others(one, campaign, progress, bare) if one.confirmed else one for one in tests]
     tests.sort(key=lambda one: -one.evidence)
     confirmed = [one for one in tests if one.confirmed]
     if not confirmed:
@@ -260,18 +266,21 @@ def judge_conditions(campaign: Campaign, place: Mapping[str, int], progress: Cal
         both = with_conditions(campaign, frozenset(one.effect for one in (*kept, other)))
         if other.confirmed:
             # It must be seen beside the first, which it may have stood in for.
-            made = _beside(fit, both)
+            made = _beside(fit, both, bare)
         else:
             # The first may have hidden it: what a condition leaves to explain looks like another one turned round.
             progress(f"estimating a {effects()[other.effect].title.lower()} of every log beside what is confirmed")
-            seen = _against_others(_tested(both, other.effect, progress), campaign, progress)
+            seen = _against_others(_tested(both, other.effect, progress, bare), campaign, progress, bare)
             made, beside[other.effect] = (seen.fit if seen.confirmed else None), replace(seen, alone=other.evidence)
         if made is not None:
             kept, fit = [*kept, other], made
     if len(kept) > 1:
         # What is told of each is what it is beside the others, and each must hold there.
+        done = {one.effect: one for one in beside.values() if one.fit is fit}
         together = {
-            one.effect: replace(_tested(fit.campaign, one.effect, progress, made=fit), alone=one.evidence)
+            one.effect: done[one.effect]
+            if one.effect in done
+            else replace(_tested(fit.campaign, one.effect, progress, bare, made=fit), alone=one.evidence)
             for one in kept
         }
         if all(one.confirmed for one in together.values()):
@@ -291,21 +300,26 @@ def judge_conditions(campaign: Campaign, place: Mapping[str, int], progress: Cal
     return JudgedConditions(CommonHull(best.fit, place), tuple(seen_beside.get(one.effect, one) for one in left))
 
 
-def _beside(fit: CampaignFit, both: Campaign) -> CampaignFit | None:
+def _beside(fit: CampaignFit, both: Campaign, bare: CampaignFit) -> CampaignFit | None:
     """Return the logs with one more condition than a fit has; None where that is not seen beside what it has."""
-    made = estimate_campaign(both)
-    alone = estimate_campaign(fit.campaign, noise=made.noise)
+    made = estimate_campaign(both, bare=bare)
+    alone = estimate_campaign(fit.campaign, noise=made.noise, bare=bare)
     gain = Gain.of(held_out_loss(made).gain(held_out_loss(alone)))
     return made if made.evidence - alone.evidence >= INFERENCE.prior_odds and gain.low > 0.0 else None
 
 
 def _tested(
-    campaign: Campaign, effect: str, progress: Callable[[str], None], *, made: CampaignFit | None = None
+    campaign: Campaign,
+    effect: str,
+    progress: Callable[[str], None],
+    bare: CampaignFit,
+    *,
+    made: CampaignFit | None = None,
 ) -> ConditionTest:
     """Test a condition beside the others that the logs of a campaign have; `made` is the estimate with it, if there is one."""
-    made = estimate_campaign(campaign) if made is None else made
+    made = estimate_campaign(campaign, bare=bare) if made is None else made
     others = frozenset(one.effect.id for one in campaign.conditions) - {effect}
-    none = estimate_campaign(with_conditions(campaign, others), noise=made.noise)
+    none = estimate_campaign(with_conditions(campaign, others), noise=made.noise, bare=bare)
     evidence = made.evidence - none.evidence
     loss = held_out_loss(none), held_out_loss(made)
     gains = loss[1].gain(loss[0])
@@ -316,7 +330,7 @@ def _tested(
     progress("estimating the same on headings that the vessel did not have")
     against: dict[str, PlaceboTest] = {}
     for name, placebo in placebos(campaign, effect).items():
-        other = estimate_campaign(placebo, noise=made.noise)
+        other = estimate_campaign(placebo, noise=made.noise, bare=bare)
         over = gains - held_out_loss(other).gain(loss[0])
         share, like = 0.0, 0.0
         if not campaign.hull.known:
@@ -326,7 +340,9 @@ def _tested(
     return replace(test, placebos=against)
 
 
-def _against_others(test: ConditionTest, campaign: Campaign, progress: Callable[[str], None]) -> ConditionTest:
+def _against_others(
+    test: ConditionTest, campaign: Campaign, progress: Callable[[str], None], bare: CampaignFit
+) -> ConditionTest:
     """Return a test with the other conditions that explain more where they cannot be true.
 
     What a condition leaves to explain, a force that no condition is, may look like another one turned round.
@@ -337,7 +353,7 @@ def _against_others(test: ConditionTest, campaign: Campaign, progress: Callable[
         progress(f"estimating a {title} on headings that the vessel did not have")
         instead = with_conditions(campaign, frozenset([name, *test.beside]))
         for where, placebo in placebos(instead, name).items():
-            if estimate_campaign(placebo, noise=test.fit.noise).evidence > test.fit.evidence:
+            if estimate_campaign(placebo, noise=test.fit.noise, bare=bare).evidence > test.fit.evidence:
                 outdone.append(f"{title} on {where}")
     return replace(test, outdone=tuple(outdone))
 

@@ -12,7 +12,7 @@ from ferryid.counts import counted
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit
 from ferryid.diagnose.inference.campaign_model import Campaign
-from ferryid.diagnose.inference.campaign_properties import ScoredProperty, select_properties, without_property
+from ferryid.diagnose.inference.campaign_properties import select_properties, without_property
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.force_errors import mass_of
 from ferryid.diagnose.inference.thresholds import INFERENCE
@@ -118,11 +118,11 @@ class PropertyTest:
 def judge_properties(made: CampaignFit, progress: Callable[[str], None]) -> tuple[PropertyTest, ...]:
     """Select lasting properties beside the hull and the conditions of an estimate, and judge each on held-out data."""
     found, rivals = select_properties(made, progress)
-    return tuple(tested(found, one, rivals) for one in found.campaign.properties)
+    return tuple(tested(found, one, rivals.get(one.key, ())) for one in found.campaign.properties)
 
 
-def tested(made: CampaignFit, candidate: Candidate, rivals: Sequence[ScoredProperty]) -> PropertyTest:
-    """Return what speaks for one of the properties of an estimate."""
+def tested(made: CampaignFit, candidate: Candidate, rivals: Sequence[tuple[Candidate, float]]) -> PropertyTest:
+    """Return what speaks for one of the properties of an estimate; rivals are given with their log odds over it."""
     without = without_property(made, candidate)
     before, after = held_out_loss(without), held_out_loss(made)
     gains = after.gain(before)
@@ -144,11 +144,11 @@ def tested(made: CampaignFit, candidate: Candidate, rivals: Sequence[ScoredPrope
         if one.name not in unreported
     ]
     evidence = made.evidence - without.evidence
-    others = [
-        Rival(one.candidate.effect.id, one.candidate.instance, min(one.gain - evidence, 0.0))
-        for one in sorted(rivals, key=lambda one: -one.gain)
-        if one.candidate.key not in {each.key for each in made.campaign.properties}
-    ]
+    others = tuple(
+        Rival(one.effect.id, one.instance, min(odds, 0.0))
+        for one, odds in sorted(rivals, key=lambda one: -one[1])
+        if one.key not in {each.key for each in made.campaign.properties}
+    )
     return PropertyTest(
         candidate,
         {one.name: Estimate.normal(at, e, one.unit) for one, at, e in reported},
@@ -156,7 +156,7 @@ def tested(made: CampaignFit, candidate: Candidate, rivals: Sequence[ScoredPrope
         Gain.of(gains),
         (sum(one > 0.0 for one in by_log), len(by_log)),
         np.asarray(1.0 - squares[1] / np.where(squares[0] > 0.0, squares[0], np.inf)),
-        tuple({(one.effect, one.instance): one for one in reversed(others)}.values()),
+        others,
         _credibility(made, candidate, {one.name: at for one, at, _ in reported}),
     )
 

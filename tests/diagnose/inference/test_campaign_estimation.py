@@ -228,7 +228,7 @@ def test_two_conditions_that_are_confirmed_alike_are_hints(monkeypatch: pytest.M
     assert wind.confirmed
     behind = {"wind": 0.0}
 
-    def tested(made: Campaign, name: str, _: object) -> ConditionTest:
+    def tested(made: Campaign, name: str, *_: object) -> ConditionTest:
         return replace(wind, effect=name, fit=replace(wind.fit, campaign=made), evidence=wind.evidence - behind[name])
 
     both = campaign(conditions=("wind", "current"))
@@ -254,7 +254,7 @@ def test_what_holds_beside_a_condition_that_does_not_hold_beside_it_stays_open(m
     both = campaign(conditions=("wind", "current"))
     together, stream = estimate_campaign(both), estimate_campaign(campaign(conditions=("current",)))
 
-    def tested(logs: Campaign, name: str, _: object, **_given: object) -> ConditionTest:
+    def tested(logs: Campaign, name: str, *_: object, **_given: object) -> ConditionTest:
         alone = len(logs.conditions) == 1
         found = replace(wind, effect=name, fit={"wind": wind.fit, "current": stream}[name] if alone else together)
         # A current is confirmed alone, a wind beside it, and the current not beside the wind.

@@ -9,9 +9,16 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.inference import campaign_estimation
-from ferryid.diagnose.inference.campaign_estimation import estimate_campaign
+from ferryid.diagnose.inference import campaign_properties as selection
+from ferryid.diagnose.inference.campaign_estimation import CampaignFit, estimate_campaign
 from ferryid.diagnose.inference.campaign_model import Campaign, Member
-from ferryid.diagnose.inference.campaign_properties import properties_of, score, select_properties
+from ferryid.diagnose.inference.campaign_properties import (
+    ScoredProperty,
+    properties_of,
+    score,
+    select_properties,
+    with_property,
+)
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging import campaign as judging
@@ -105,6 +112,46 @@ def test_what_the_evidence_does_not_speak_for_beside_conditions_is_no_hint(monke
     # Nor does it act unseen in the hull that the logs are compared with.
     assert judged.hull.fit.campaign.properties == ()
     assert judged.force_models("0") is None
+
+
+def test_what_was_tried_in_a_propertys_place_is_compared_in_its_own_round(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = estimate_campaign(weakened(0.8))
+    gains = iter([{("thruster_gain", "thruster1"): 50.0, ("thruster_lag", None): 48.0}, {}])
+    monkeypatch.setattr(selection, "WEIGHED", 99)
+    monkeypatch.setattr(selection, "score", lambda *_: 1.0)
+
+    def estimated(made: CampaignFit, candidate: Candidate) -> ScoredProperty:
+        return ScoredProperty(candidate, with_property(made, candidate), gain.get(candidate.key, 0.0))
+
+    def left(campaign: Campaign) -> list[Candidate]:
+        nonlocal gain
+        gain = next(gains)
+        return properties_of(campaign)
+
+    gain: dict[tuple[str, str | None], float] = {}
+    monkeypatch.setattr(selection, "_estimated", estimated)
+    monkeypatch.setattr(selection, "properties_of", left)
+    _, rivals = select_properties(made, no_progress)
+    assert list(rivals) == [("thruster_gain", "thruster1")]
+    (first, *_) = sorted(rivals["thruster_gain", "thruster1"], key=lambda one: -one[1])
+    assert (first[0].key, first[1]) == (("thruster_lag", None), -2.0)
+
+
+def test_a_guessed_hulls_volume_does_not_decide_between_two_thrusters() -> None:
+    made = estimate_campaign(weakened(0.8))
+    gain, other = (Candidate.of(effects()["thruster_gain"], one, FERRY) for one in ("thruster1", "thruster2"))
+    lag = Candidate.of(effects()["thruster_lag"], None, FERRY)
+    for known in (True, False):
+        fit = replace(made, campaign=replace(made.campaign, hull=replace(made.campaign.hull, known=known)))
+        worse = replace(fit, common=fit.common + 0.1)
+        less = 0.5 * (worse.cost - fit.cost)
+        first, second = ScoredProperty(gain, fit, 50.0), ScoredProperty(other, worse, 55.0)
+        # The evidence, as far as it is no guess; else what is left and asked of the hull.
+        assert first.over(second) == pytest.approx(-5.0 if known else less)
+        assert second.over(first) == pytest.approx(5.0 if known else -less)
+        assert less > 0.1
+        # Effects with other parameters are weighed by the evidence.
+        assert first.over(ScoredProperty(lag, worse, 55.0)) == -5.0
 
 
 def test_scores_rank_as_fits_do() -> None:
