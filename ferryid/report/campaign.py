@@ -132,6 +132,8 @@ def flow_figure(diagnoses: Sequence[Diagnosis], effect: str) -> str:
                     ax.plot([k], [hidden.measured[name]], "_", color=MEASURED, ms=14, mew=2, label="measured, withheld")
             ax.axhline(0.0, color="#888888", linewidth=0.7)
             ax.set_ylabel(f"{name} [m/s]")
+            # Beside a slow current's three decimals.
+            ax.yaxis.set_label_coords(-0.135, 0.5)
         axes[-1].set_xticks(range(1, len(shown) + 1))
         axes[-1].set_xlabel("log, in the order of the table")
         handles, labels = axes[0].get_legend_handles_labels()

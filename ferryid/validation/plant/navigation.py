@@ -38,17 +38,21 @@ class Errors(NamedTuple):
     gyro: Floats
 
 
+def slow_errors(rng: np.random.Generator, samples: int, columns: int, std: float, time_s: float) -> Floats:
+    """Return Gauss-Markov processes of a standard deviation and a time constant [s], shape (samples, columns)."""
+    keep = exp(-1.0 / RATE_HZ / time_s)
+    steps = rng.standard_normal((samples, columns)) * std * np.sqrt(1.0 - keep * keep)
+    steps[0] = rng.standard_normal(columns) * std
+    for row in range(1, samples):
+        steps[row] += keep * steps[row - 1]
+    return np.asarray(steps)
+
+
 def instrument_errors(rng: np.random.Generator, samples: int, factor: float) -> Errors:
     """Return the errors of all instruments, `factor` times as large as usual ones."""
-    h = 1.0 / RATE_HZ
 
     def slow(std: float, time_s: float, columns: int) -> Floats:
-        keep = exp(-h / time_s)
-        steps = rng.standard_normal((samples, columns)) * std * np.sqrt(1.0 - keep * keep)
-        steps[0] = rng.standard_normal(columns) * std
-        for row in range(1, samples):
-            steps[row] += keep * steps[row - 1]
-        return np.asarray(steps)
+        return slow_errors(rng, samples, columns, std, time_s)
 
     def white(std: float, columns: int) -> Floats:
         return np.asarray(std * rng.standard_normal((samples, columns)))

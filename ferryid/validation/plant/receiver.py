@@ -12,7 +12,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from ferryid.types import Floats
-from ferryid.validation.plant.navigation import RATE_HZ
+from ferryid.validation.plant.navigation import RATE_HZ, slow_errors
 from ferryid.validation.plant.trial import Trial, instrument_motion
 
 FIX_M, DRIFT_M, DRIFT_S = 0.03, 0.05, 30.0
@@ -58,12 +58,8 @@ def received(trial: Trial, rng: np.random.Generator, lag_s: float, factor: float
 
 
 def _errors(rng: np.random.Generator, samples: int, columns: int, white: float, slow: float, time_s: float) -> Floats:
-    """Return white errors and a Gauss-Markov process, each of its standard deviation, shape (samples, columns)."""
-    keep = exp(-1.0 / (RATE_HZ * time_s))
-    steps = rng.standard_normal((samples, columns))
-    steps[1:] *= np.sqrt(1.0 - keep * keep)
-    drift = lfilter([1.0], [1.0, -keep], steps, axis=0)
-    return np.asarray(white * rng.standard_normal((samples, columns)) + slow * drift)
+    """Return white errors and slow ones, each of its standard deviation, shape (samples, columns)."""
+    return white * rng.standard_normal((samples, columns)) + slow_errors(rng, samples, columns, slow, time_s)
 
 
 def _filtered(values: Floats, lag_s: float) -> Floats:
