@@ -1,8 +1,8 @@
 """Lasting properties of a vessel, selected by what all of its logs say together.
 
-Every candidate is first weighed by its gradient where it does not act (Rao's score test, hull and conditions of all logs
-partialled out); the best are then estimated beside everything else, and one after the other is selected as long as the evidence
-speaks for it.
+Every candidate is first weighed by gaps and slopes where a search for it begins (a score test as Rao's, hull and conditions of
+all logs partialled out); the best are then estimated beside everything else, and one after the other is selected as long as the
+evidence speaks for it.
 
 References
 ----------
@@ -29,8 +29,19 @@ from ferryid.vessel.profile import Profile
 
 INSTRUMENTS = frozenset({"time_delay"})
 """What is no property of hull or actuators, and yet the same in all logs of a vessel."""
-WEIGHED = 5
-"""Candidates that are estimated in a round, the best by their scores."""
+WEIGHED, WORTH = 5, 0.25
+"""Most candidates that are estimated in a round, the best by their scores, and the least of the best score that one has."""
+STARTS = (1.0, 0.75, 0.5, 0.25)
+"""Shares of the way to its start at which a property with a limit is weighed: only beyond the limit do forces depend on it."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where the search for a property begins, and the evidence that it would add if the gaps were linear from there [nat]."""
+
+    candidate: Candidate
+    begun: CampaignFit
+    gain: float
 
 
 @dataclass(frozen=True)
@@ -90,9 +101,10 @@ def select_properties(made: CampaignFit, progress: Callable[[str], None]) -> tup
         # What is compared has the same noise and has settled under it.
         made = estimate_campaign(made.campaign, noise=made.noise, begin=made)
         progress(f"weighing {len(left)} lasting properties over all logs")
-        scores = over(partial(score, made), left)
-        order = [k for k in np.argsort(scores)[::-1][:WEIGHED].tolist() if scores[k] > 0.0]
-        found = sorted((_estimated(made, left[k]) for k in order), key=lambda one: -one.gain)
+        starts = sorted(over(partial(start_of, made), left), key=lambda one: -one.gain)
+        least = max(WORTH * starts[0].gain, 0.0) if starts else 0.0
+        found = [_estimated(made, one) for one in starts[:WEIGHED] if one.gain > least]
+        found.sort(key=lambda one: -one.gain)
         if not found or found[0].gain < INFERENCE.prior_odds:
             break
         best = found[0]
@@ -105,37 +117,57 @@ def select_properties(made: CampaignFit, progress: Callable[[str], None]) -> tup
     return made, rivals
 
 
-def score(made: CampaignFit, candidate: Candidate) -> float:
-    """Return the evidence that a property would add if the gaps were linear in it [nat]."""
-    begun = with_property(made, candidate)
-    columns = range(begun.campaign.g - len(made.campaign.own) - len(candidate.parameters), begun.campaign.g)
-    columns = columns[: len(candidate.parameters)]
-    g, normal = made.campaign.g, made.normal
-    M, across, r = np.eye(len(columns)), np.zeros((g, len(columns))), np.zeros(len(columns))
+def start_of(made: CampaignFit, candidate: Candidate) -> Start:
+    """Return where a search for a property begins: of its starts, the one from which the gaps promise the most evidence."""
+    starts = (_linearised(made, candidate, share) for share in (STARTS if candidate.effect.piecewise else (1.0,)))
+    return max(starts, key=lambda one: one.gain)
+
+
+def _linearised(made: CampaignFit, candidate: Candidate, share: float) -> Start:
+    """Return the evidence that a property would add if the gaps were linear from some share of its start on.
+
+    Gaps and slopes are taken where the search begins: what a limit does to larger forces is no slope of what it leaves of them.
+    """
+    begun = with_property(made, candidate, share)
+    g, q, normal = made.campaign.g, len(candidate.parameters), made.normal
+    place = g - len(made.campaign.own)
+    M, across, gained = np.eye(q), np.zeros((g, q)), 0.0
+    r, common = begun.common[place : place + q].copy(), made.common + np.sum(normal.slopes, axis=0)
+    before = common.copy()
+    gained -= 0.5 * float(r @ r)
     for i, part in enumerate(made.parts):
         runs = made.campaign.members[i].windows.runs
-        D = made.noise.white(i, _slopes(begun, i, columns), runs).reshape(-1, len(columns))
-        J, w = part.slopes.reshape(-1, part.slopes.shape[2]), part.gaps.ravel()
-        with_all = J.T @ D
-        factor = cho_factor(normal.own[i])
+        here = begun.campaign.gap(i, begun.common, begun.own[i])
+        slopes = _slopes(begun, i, range(place, place + q), here)
+        white = made.noise.white(i, np.concatenate([here[:, :, None], slopes], axis=2), runs).reshape(-1, 1 + q)
+        J, was, w, D = part.slopes.reshape(-1, part.slopes.shape[2]), part.gaps.ravel(), white[:, 0], white[:, 1:]
+        with_all, moved = J.T @ D, J.T @ (w - was)
+        factor, own = cho_factor(normal.own[i]), normal.own_slopes[i] + moved[g:]
         follow = cho_solve(factor, with_all[g:])
         M += D.T @ D - with_all[g:].T @ follow
         across += with_all[:g] - normal.back[i].T @ with_all[g:]
-        r += D.T @ w - follow.T @ normal.own_slopes[i]
+        common += moved[:g] - normal.back[i].T @ moved[g:]
+        r += D.T @ w - follow.T @ own
+        gained += 0.5 * float(was @ was - w @ w)
+        gained += 0.5 * float(
+            own @ cho_solve(factor, own) - normal.own_slopes[i] @ cho_solve(factor, normal.own_slopes[i])
+        )
     A = np.eye(g) + np.sum(normal.matrices, axis=0)
-    common = made.common + np.sum(normal.slopes, axis=0)
     follow = np.linalg.solve(A, across)
     M -= across.T @ follow
     r -= follow.T @ common
-    return 0.5 * float(r @ np.linalg.solve(M, r)) - 0.5 * float(np.linalg.slogdet(M)[1])
+    gained += 0.5 * float(common @ np.linalg.solve(A, common) - before @ np.linalg.solve(A, before))
+    gained += 0.5 * float(r @ np.linalg.solve(M, r)) - 0.5 * float(np.linalg.slogdet(M)[1])
+    return Start(candidate, begun, gained)
 
 
-def with_property(made: CampaignFit, candidate: Candidate) -> CampaignFit:
-    """Return an estimate with a property more, which does not act yet."""
+def with_property(made: CampaignFit, candidate: Candidate, share: float = 1.0) -> CampaignFit:
+    """Return an estimate with a property more: at a share of the way from where it does not act to its start."""
     campaign = replace(made.campaign, properties=(*made.campaign.properties, candidate))
     place = made.campaign.g - len(made.campaign.own)
     none = [
-        ((one.neutral if one.start is None else one.start) - one.neutral) / one.size for one in candidate.parameters
+        share * ((one.neutral if one.start is None else one.start) - one.neutral) / one.size
+        for one in candidate.parameters
     ]
     return replace(made, campaign=campaign, common=np.insert(made.common, place, none))
 
@@ -153,15 +185,13 @@ def without_property(made: CampaignFit, candidate: Candidate) -> CampaignFit:
     return estimate_campaign(begun.campaign, noise=made.noise, begin=begun)
 
 
-def _estimated(made: CampaignFit, candidate: Candidate) -> ScoredProperty:
-    begun = with_property(made, candidate)
-    fit = estimate_campaign(begun.campaign, noise=made.noise, begin=begun)
-    return ScoredProperty(candidate, fit, fit.evidence - made.evidence)
+def _estimated(made: CampaignFit, start: Start) -> ScoredProperty:
+    fit = estimate_campaign(start.begun.campaign, noise=made.noise, begin=start.begun)
+    return ScoredProperty(start.candidate, fit, fit.evidence - made.evidence)
 
 
-def _slopes(begun: CampaignFit, i: int, columns: Sequence[int]) -> Floats:
-    """Return derivatives of the gaps of a log by some of the common vector, shape (J, 3, columns)."""
-    here = begun.campaign.gap(i, begun.common, begun.own[i])
+def _slopes(begun: CampaignFit, i: int, columns: Sequence[int], here: Floats) -> Floats:
+    """Return derivatives of the gaps of a log, shape (J, 3), by some of the common vector, shape (J, 3, columns)."""
     slopes = []
     for k in columns:
         moved = begun.common.copy()

@@ -14,9 +14,10 @@ from ferryid.diagnose.inference.campaign_estimation import CampaignFit, estimate
 from ferryid.diagnose.inference.campaign_model import Campaign, Member
 from ferryid.diagnose.inference.campaign_properties import (
     ScoredProperty,
+    Start,
     properties_of,
-    score,
     select_properties,
+    start_of,
     with_property,
 )
 from ferryid.diagnose.inference.estimation import Candidate
@@ -24,6 +25,7 @@ from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging import campaign as judging
 from ferryid.diagnose.judging.campaign import judge_campaign
 from ferryid.effects import effects
+from ferryid.effects.actuator_force import force_limits
 from ferryid.types import no_progress
 from tests.diagnose.inference.test_campaign_estimation import CALM, FERRY, campaign
 
@@ -118,10 +120,10 @@ def test_what_was_tried_in_a_propertys_place_is_compared_in_its_own_round(monkey
     made = estimate_campaign(weakened(0.8))
     gains = iter([{("thruster_gain", "thruster1"): 50.0, ("thruster_lag", None): 48.0}, {}])
     monkeypatch.setattr(selection, "WEIGHED", 99)
-    monkeypatch.setattr(selection, "score", lambda *_: 1.0)
+    monkeypatch.setattr(selection, "start_of", lambda made, one: Start(one, with_property(made, one), 1.0))
 
-    def estimated(made: CampaignFit, candidate: Candidate) -> ScoredProperty:
-        return ScoredProperty(candidate, with_property(made, candidate), gain.get(candidate.key, 0.0))
+    def estimated(made: CampaignFit, start: Start) -> ScoredProperty:
+        return ScoredProperty(start.candidate, start.begun, gain.get(start.candidate.key, 0.0))
 
     def left(campaign: Campaign) -> list[Candidate]:
         nonlocal gain
@@ -156,10 +158,49 @@ def test_a_guessed_hulls_volume_does_not_decide_between_two_thrusters() -> None:
 
 def test_scores_rank_as_fits_do() -> None:
     made = estimate_campaign(weakened(0.8))
-    scores = {one.key: score(made, one) for one in properties_of(made.campaign)}
+    scores = {one.key: start_of(made, one).gain for one in properties_of(made.campaign)}
     assert max(scores, key=lambda key: scores[key]) == ("thruster_gain", "thruster1")
     assert scores["thruster_gain", "thruster1"] > 20.0
     assert scores["thruster_lag", None] < 0.5 * scores["thruster_gain", "thruster1"]
+
+
+@cache
+def limited(limit: float) -> Campaign:
+    """Return calm logs whose first thruster gave no more than a force [N], and the second what is missing."""
+    whole = campaign(CALM, conditions=())
+
+    def believed(member: Member) -> Member:
+        plain = member.plain
+        force, t = plain.parts.sum(axis=1), member.windows.measurements.t
+        order = (0.5 + 0.5 * np.sin(t / 13.0)) * force_limits(FERRY.actuators[0])[0]
+        angle, (x, y) = plain.angles[:, 0], FERRY.actuators[0].position_m
+        ahead = np.column_stack([np.cos(angle), np.sin(angle), x * np.sin(angle) - y * np.cos(angle)])
+        given = np.minimum(order, limit)[:, None] * ahead
+        parts = np.stack([order[:, None] * ahead, force - given], axis=1)
+        seen = replace(member.windows.measurements, parts=parts)
+        plain = replace(plain, parts=parts, measurements=seen)
+        return replace(member, plain=plain, windows=replace(member.windows, measurements=seen))
+
+    return replace(whole, members=tuple(believed(member) for member in whole.members))
+
+
+@pytest.mark.parametrize("share", [0.85, 0.6, 0.35])
+def test_a_limit_of_a_thrusters_force_is_found_from_where_forces_depend_on_it(share: float) -> None:
+    end = force_limits(FERRY.actuators[0])[0]
+    found, rivals = select_properties(estimate_campaign(limited(share * end)), no_progress)
+    ((limit, _),) = found.campaign.values(found.common, found.own[0])[1]
+    assert [one.key for one in found.campaign.properties] == [("thrust_saturation", "thruster1")]
+    assert limit == pytest.approx(share * end, rel=0.03)
+    # What only takes off a share of a large force is not as good.
+    assert all(odds < -5.0 for _, odds in rivals["thrust_saturation", "thruster1"])
+
+
+def test_what_a_start_promises_is_what_the_estimate_keeps() -> None:
+    made = estimate_campaign(limited(0.6 * force_limits(FERRY.actuators[0])[0]))
+    made = estimate_campaign(made.campaign, noise=made.noise, begin=made)
+    start = start_of(made, Candidate.of(effects()["thrust_saturation"], "thruster1", FERRY))
+    kept = estimate_campaign(start.begun.campaign, noise=made.noise, begin=start.begun)
+    assert start.gain == pytest.approx(kept.evidence - made.evidence, rel=0.3)
 
 
 def test_errors_of_the_navigation_need_a_known_hull() -> None:
@@ -167,7 +208,7 @@ def test_errors_of_the_navigation_need_a_known_hull() -> None:
     guessed = replace(known, hull=replace(known.hull, known=False))
     assert {"lever_arm", "heading_bias"} <= {one.effect.id for one in properties_of(known)}
     assert not {"lever_arm", "heading_bias"} & {one.effect.id for one in properties_of(guessed)}
-    assert np.isfinite(score(estimate_campaign(known), properties_of(known)[0]))
+    assert np.isfinite(start_of(estimate_campaign(known), properties_of(known)[0]).gain)
 
 
 def test_what_one_log_shows_of_one_actuator_is_weighed_of_that_actuator() -> None:
