@@ -41,9 +41,10 @@ from ferryid.files import alone, dump_json, remove_abandoned, write_text
 from ferryid.ingest import open_log
 from ferryid.ingest.hashing import content_hash
 from ferryid.models import Model, model_to_json
-from ferryid.report.batch_page import render
+from ferryid.report.batch_page import render, timelines
 from ferryid.report.batch_rows import BatchResult, Change, MemoryUse
 from ferryid.report.diagnosis_report import patient
+from ferryid.report.interactive import make_interactive
 from ferryid.signals.recording import log_name
 from ferryid.signals.time_ranges import as_text
 from ferryid.types import TimeRanges
@@ -137,7 +138,10 @@ def batch(
         result = replace(result, changes=groups(again, progress, tell), seconds=time.monotonic() - begun)
         progress("writing the summary")
         write_table(folder / "summary.parquet", table_of(result.rows))
-        write_text(folder / "index.html", render(result))
+        interactive = make_interactive(timelines(result), folder, out.resolve())
+        for file, text in interactive.files().items():
+            write_text(folder / file, text)
+        write_text(folder / "index.html", render(result, interactive))
         write_text(folder / "batch.json", dump_json(result.to_json()))
     progress("")
     return result

@@ -47,11 +47,16 @@ def findings(trends: Sequence[Trend]) -> str:
             if one.neutral is not None:
                 x = [_x(where.date, where.place, dated) for where in one.absent]
                 ax.plot(x, [one.neutral] * len(x), "|", color=ABSENT, markersize=7, label="not found")
-            unit = "" if one.unit == "-" else f" [{one.unit}]"
-            ax.set_ylabel(f"{one.parameter.replace('_', ' ')}{unit}")
+            ax.set_ylabel(parameter_label(one))
         _horizontal(every, dated)
         _legend(figure, every)
         return svg_text(figure)
+
+
+def parameter_label(one: Trend) -> str:
+    """Return the name of a parameter, with its unit where it has one."""
+    unit = "" if one.unit == "-" else f" [{one.unit}]"
+    return f"{one.parameter.replace('_', ' ')}{unit}"
 
 
 def errors(rows: Sequence[SummaryRow], dated: bool) -> str:

@@ -1,4 +1,4 @@
-"""The page of a batch: one row a log, to be filtered and sorted, and what changes over the dates; it needs nothing else."""
+"""The page of a batch: one row a log, to be filtered and sorted, and what changes over the dates."""
 
 from __future__ import annotations
 
@@ -16,8 +16,11 @@ from ferryid.counts import counted
 from ferryid.diagnose import JUDGING
 from ferryid.report import batch_figures
 from ferryid.report.batch_rows import BatchResult, EvaluationSummary, FindingSummary, SummaryRow, Trend, by_date
+from ferryid.report.batch_timeline import errors_timeline, findings_timeline, row_id
 from ferryid.report.diagnosis_words import title
 from ferryid.report.html import template
+from ferryid.report.interactive import STATIC, Interactive
+from ferryid.report.timeline import Timeline
 from ferryid.signals.data_quality import LostData
 from ferryid.types import AXES
 
@@ -63,6 +66,7 @@ class MeanError:
 class TableRow:
     """A row of the table of logs, as the template shows it; ``bare`` without results."""
 
+    id: str
     log: str
     name: str
     status: str
@@ -89,16 +93,29 @@ class TableRow:
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure with its title and caption."""
+    """A figure with title and caption; `marks` tells of those of the drawing, `timeline` is the number of its other form."""
 
     title: str
     svg: str
     caption: str
+    marks: str
+    timeline: int
 
 
-def render(result: BatchResult) -> str:
+def timelines(result: BatchResult) -> dict[int, Timeline]:
+    """Return the interactive figures of the page by the places of their figures."""
+    places = {id(row): place for place, row in enumerate(result.rows)}
+    found = []
+    for head, every in _findings(result.trends):
+        diagnosed, _ = by_date([row for row in result.rows if row.vessel == every[0].vessel and row.diagnose])
+        found.append(findings_timeline(head, every, diagnosed, places))
+    found += [errors_timeline(head, rows, dated, places) for head, rows, dated in _errors(result.rows)]
+    return dict(enumerate(found))
+
+
+def render(result: BatchResult, interactive: Interactive = STATIC) -> str:
     """Return the page as HTML."""
-    rows = [_row(row) for row in result.rows]
+    rows = [_row(row, row_id(place)) for place, row in enumerate(result.rows)]
     counts = result.counts
     return template("batch.html").render(
         rows=rows,
@@ -118,7 +135,8 @@ def render(result: BatchResult) -> str:
             }
             for one in result.changes
         ],
-        figures=[*_findings(result.trends), *_errors(result.rows)],
+        figures=_figures(result, interactive),
+        assets=interactive.assets,
         choices={
             "vessel": sorted({row.vessel for row in rows if row.vessel}),
             "status": sorted({row.status for row in rows if row.status}),
@@ -166,7 +184,7 @@ def _headline(counts: Mapping[str, int]) -> str:
     return f"{logs}, all done" if counts["logs"] == counts["done"] else f"{logs}, {counts['done']} done"
 
 
-def _row(row: SummaryRow) -> TableRow:
+def _row(row: SummaryRow, name: str) -> TableRow:
     fit, evaluation, diagnosis = row.fit, row.evaluate, row.diagnose
     sure = [one for one in row.findings if one.probability > JUDGING.hint_probability]
     links = [
@@ -176,6 +194,7 @@ def _row(row: SummaryRow) -> TableRow:
         *([("traceback", "traceback.txt")] if row.status == "failed" else []),
     ]
     return TableRow(
+        id=name,
         log=row.log,
         name=row.name,
         status=row.status,
@@ -234,43 +253,43 @@ def _mean_error(evaluation: EvaluationSummary) -> MeanError:
     return MeanError(tuple(None if one is None else one**0.5 for one in mse), evaluation.normalised_mse)
 
 
-def _findings(trends: Sequence[Trend]) -> list[Figure]:
+def _findings(trends: Sequence[Trend]) -> list[tuple[str, list[Trend]]]:
+    """Return what is drawn of findings: title, and the parameters of an effect of a vessel."""
     shown = []
     for (vessel, head), group in groupby(trends, lambda one: (one.vessel, one.title)):
         every = [one for one in group if len(one.points) >= FEWEST_DRAWN]
-        if not every:
-            continue
-        logs = {point.log for one in every for point in one.points}
-        order = "" if every[0].dated else " Not all logs have a date, so that they stand in their order."
-        shown.append(
-            Figure(
-                f"{head}, {vessel}",
-                batch_figures.findings(every),
-                f"{head} in {counted(len(logs), 'log')}, with their 95 % intervals. Hollow: a hint, less likely than not. "
-                f"Grey: logs whose diagnosis did not find it.{order}",
-            )
-        )
+        if every:
+            shown.append((f"{head}, {vessel}", every))
     return shown
 
 
-def _errors(rows: Sequence[SummaryRow]) -> list[Figure]:
+def _errors(rows: Sequence[SummaryRow]) -> list[tuple[str, list[SummaryRow], bool]]:
+    """Return what is drawn of errors: title, the logs of a vessel in their order, and whether that is of their dates."""
     shown = []
     for vessel in dict.fromkeys(row.vessel for row in rows):
         own, dated = by_date([row for row in rows if row.vessel == vessel and (row.fit or row.evaluate)])
-        if len(own) < FEWEST_DRAWN:
-            continue
-        of = next((row.evaluate.evaluated for row in own if row.evaluate), "")
-        evaluated = f" Crosses: {of}, on the whole log." if of else ""
-        fitted = (
-            "Circles: the base model, and the model fitted to the log itself, on the log's validation rows."
-            if any(row.fit for row in own)
-            else ""
-        )
-        shown.append(
-            Figure(
-                f"Force errors, {vessel}",
-                batch_figures.errors(own, dated),
-                f"Root-mean-square force error of {counted(len(own), 'log')}. {fitted}{evaluated}",
-            )
-        )
+        if len(own) >= FEWEST_DRAWN:
+            shown.append((f"Force errors, {vessel}", own, dated))
     return shown
+
+
+def _figures(result: BatchResult, interactive: Interactive) -> list[Figure]:
+    shown = []
+    for head, every in _findings(result.trends):
+        logs = {point.log for one in every for point in one.points}
+        order = "" if every[0].dated else " Not all logs have a date, so that they stand in their order."
+        caption = f"{every[0].title} in {counted(len(logs), 'log')}, with their 95 % intervals.{order}"
+        marks = "Hollow: a hint, less likely than not. Grey: logs whose diagnosis did not find it."
+        shown.append((head, batch_figures.findings(every), caption, marks))
+    for head, own, dated in _errors(result.rows):
+        of = next((row.evaluate.evaluated for row in own if row.evaluate), "")
+        caption = f"Root-mean-square force error of {counted(len(own), 'log')}."
+        tested = []
+        if any(row.fit for row in own):
+            caption += " The base model and the model fitted to the log itself are tested on the log's validation rows."
+            tested.append("Circles: these two.")
+        if of:
+            caption += f" {of[:1].upper()}{of[1:]} is tested on the whole log."
+            tested.append(f"Crosses: {of}.")
+        shown.append((head, batch_figures.errors(own, dated), caption, " ".join(tested)))
+    return [Figure(*one, interactive.number(place)) for place, one in enumerate(shown)]

@@ -27,6 +27,8 @@ from ferryid.types import AXES, Floats
 
 WIDTH = 6.0
 MEASURED, BASE, NEW, SHADE = "#222222", "#d55e00", "#0072b2", "#e8eef4"
+ROLES = {MEASURED: "measured", BASE: "base", NEW: "new"}
+"""These colours by their names in the pages, whose interactive figures have a light and a dark one of each."""
 UNITS = ("N", "N", "N·m")
 REACH = 8.0
 """Where the axis of the coefficient figure ends; a coefficient this far from zero is beyond doubt anyway."""

@@ -11,13 +11,11 @@ from ferryid.compare import ComparedLog, ComparedModel
 from ferryid.identify import LogFit
 from ferryid.report.figures import SYMBOLS, UNITS
 from ferryid.report.structure import worst_and_best_minute, worst_minute
-from ferryid.report.timeline import Arrows, Mark, Strip, Timeline, Trace, flagged, left_out_spans
+from ferryid.report.timeline import PALETTE, Arrows, Mark, Strip, Timeline, Trace, flagged, left_out_spans
 from ferryid.signals.track import Motion
 from ferryid.types import AXES, Flags, Floats
 
 MINUTE_S = 60.0
-PALETTE = 6
-"""Colours ``c0`` to ``c5`` of the pages."""
 
 
 def fit_timeline(log: LogFit) -> Timeline | None:

@@ -21,7 +21,7 @@ from ferryid.errors import UnwritableError
 from ferryid.files import remove_abandoned, replacing
 from ferryid.report.timeline import Timeline, scripts
 
-SCRIPTS = ("uplot.js", "theme.js", "decode.js", "map.js", "strips.js", "timeline.js")
+SCRIPTS = ("uplot.js", "theme.js", "decode.js", "axis.js", "map.js", "strips.js", "timeline.js")
 """In the order in which a page loads them."""
 STYLES = ("uplot.css", "timeline.css")
 LICENCE = "uplot-LICENSE.txt"
@@ -50,7 +50,7 @@ class Interactive:
     Attributes
     ----------
     timelines
-        By the place of their log on the page, from 0.
+        By the place of their log, or of their figure, on the page, from 0.
     place
         Address of the folder of the scripts as the page links to it.
     """
@@ -59,7 +59,7 @@ class Interactive:
     place: str = ""
 
     def number(self, log: int) -> int:
-        """Return which timeline is a log's, from 1; 0 where it has none."""
+        """Return which timeline is that of a log or a figure, from 1; 0 where it has none."""
         return list(self.timelines).index(log) + 1 if log in self.timelines else 0
 
     @property

@@ -18,9 +18,11 @@ from ferryid.identify.sweeps import (
 )
 from ferryid.report.folder import made
 from ferryid.report.html import template
+from ferryid.report.interactive import STATIC, Interactive
 from ferryid.report.outcome import Report
 from ferryid.report.structures_figures import forest
 from ferryid.report.structures_text import count_terms, render_structures, supported_structure
+from ferryid.report.structures_timeline import structures_timeline
 from ferryid.report.sweep_report import leave
 from ferryid.types import AXES, RunContext
 from ferryid.vessel.profile import Profile
@@ -43,12 +45,20 @@ def structures_and_report(
         raise FerryIdError("--windows: bases are compared at one window. Fix: give --window")
     found = sweep_structures(logs, profile, settings, run, folds=folds)
     run.progress("writing the report")
-    page, drawings = render(found, run.command)
-    text = render_structures(found)
-    return leave(run, "basis", found.logs, page, drawings, lambda report: structures_json(found, report), text)
+    return leave(
+        run,
+        "basis",
+        found.logs,
+        {k: structures_timeline(one) for k, one in enumerate(found.by.values())},
+        lambda interactive: render(found, run.command, interactive),
+        lambda report: structures_json(found, report),
+        render_structures(found),
+    )
 
 
-def render(found: StructureSweep, command: Sequence[str] = ()) -> tuple[str, dict[str, str]]:
+def render(
+    found: StructureSweep, command: Sequence[str] = (), interactive: Interactive = STATIC
+) -> tuple[str, dict[str, str]]:
     """Return the page of compared structures as HTML with the drawings inside, and the drawings (SVG) by name."""
     drawings = {f"basis-{key}": forest(one) for key, one in found.by.items()}
     sections = [
@@ -59,13 +69,15 @@ def render(found: StructureSweep, command: Sequence[str] = ()) -> tuple[str, dic
             "best": one.structures[0].title,
             "simplest": one.simplest.title,
             "svg": drawings[f"basis-{key}"],
+            "timeline": interactive.number(place),
             "table": _rows(one),
         }
-        for key, one in found.by.items()
+        for place, (key, one) in enumerate(found.by.items())
     ]
     plain = structures_json(found)
     page = template("structures.html").render(
         made=made(command),
+        assets=interactive.assets,
         vessel=found.vessel,
         headline=supported_structure(found.by["blocks"]),
         notes=found.notes,

@@ -9,9 +9,12 @@ from ferryid.identify import FOLDS, FitSettings
 from ferryid.identify.sweeps import BY, Sweep, sweep_json, sweep_settings
 from ferryid.report.folder import PAGE, made, write_folder
 from ferryid.report.html import template
+from ferryid.report.interactive import STATIC, Interactive, make_interactive
 from ferryid.report.outcome import Report
 from ferryid.report.sweep_figures import curves, heat_map
 from ferryid.report.sweep_text import headline, render_sweep
+from ferryid.report.sweep_timeline import sweep_timeline
+from ferryid.report.timeline import Timeline
 from ferryid.types import AXES, RunContext
 from ferryid.vessel.profile import Profile
 
@@ -30,33 +33,53 @@ def sweep_and_report(
     """Sweep settings over logs and write the page; arguments and errors are those of `sweep_settings`."""
     found = sweep_settings(what, logs, profile, settings, run, windows_s=windows_s, folds=folds, archive=archive)
     run.progress("writing the report")
-    page, drawings = render(found, run.command)
-    return leave(run, what, found.logs, page, drawings, lambda report: sweep_json(found, report), render_sweep(found))
+    timelines = {k: sweep_timeline(found, choice) for k, choice in enumerate(found.by.values())}
+    return leave(
+        run,
+        what,
+        found.logs,
+        timelines,
+        lambda interactive: render(found, run.command, interactive),
+        lambda report: sweep_json(found, report),
+        render_sweep(found),
+    )
 
 
 def leave(
     run: RunContext,
     what: str,
     logs: Sequence[Mapping[str, Any]],
-    page: str,
-    drawings: Mapping[str, str],
+    timelines: Mapping[int, Timeline],
+    page_of: Callable[[Interactive], tuple[str, dict[str, str]]],
     json_of: Callable[[str], dict[str, Any]],
     text: str,
 ) -> Report:
-    """Write page, drawings and JSON of a sweep into its folder; `json_of` returns the JSON for the page's path."""
+    """Write page, drawings and JSON of a sweep into its folder.
+
+    Parameters
+    ----------
+    run, what, logs
+        Where to, what was swept, and over which logs.
+    timelines, page_of
+        Interactive figures by the section of the page, and the page with its drawings (SVG) by name that shows them.
+    json_of, text
+        Return the JSON for the page's path; what a terminal shows.
+    """
     first = str(logs[0]["name"])
     more = f"-and-{len(logs) - 1}-more" if len(logs) > 1 else ""
     report = run.out / "reports" / f"sweep-{what}-{first}{more}" / PAGE
     plain = json_of(str(report))
-    write_folder(report.parent, page, drawings, plain, "sweep.json")
+    interactive = make_interactive(timelines, report.parent, run.out)
+    page, drawings = page_of(interactive)
+    write_folder(report.parent, page, drawings, plain, "sweep.json", scripts=interactive.files())
     run.progress("")
     return Report(plain, f"{text}\nreport  {report}", report)
 
 
-def render(found: Sweep, command: Sequence[str] = ()) -> tuple[str, dict[str, str]]:
+def render(found: Sweep, command: Sequence[str] = (), interactive: Interactive = STATIC) -> tuple[str, dict[str, str]]:
     """Return the page of a sweep as HTML with the drawings inside, and the drawings (SVG) by name."""
     drawings, sections = {}, []
-    for key, choice in found.by.items():
+    for place, (key, choice) in enumerate(found.by.items()):
         name = f"{found.what}-{key}"
         drawings[name] = heat_map(found, choice) if len(found.windows_s) > 1 else curves(found, choice)
         sections.append(
@@ -65,6 +88,7 @@ def render(found: Sweep, command: Sequence[str] = ()) -> tuple[str, dict[str, st
                 "folds": choice.curves.folds,
                 "rows": choice.curves.rows,
                 "svg": drawings[name],
+                "timeline": interactive.number(place),
                 "choice": {"window_s": f"{choice.window_s:g}", "components": choice.components},
                 "table": _rows(found, key),
             }
@@ -72,6 +96,7 @@ def render(found: Sweep, command: Sequence[str] = ()) -> tuple[str, dict[str, st
     page = template("sweep.html").render(
         what="windows and components" if found.what == "both" else f"{found.what.rstrip('s')}s",
         made=made(command),
+        assets=interactive.assets,
         vessel=found.vessel,
         headline=headline(found),
         notes=found.notes,

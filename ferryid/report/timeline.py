@@ -1,7 +1,8 @@
-"""Signals of a log over time, for the interactive figures of a page: as data beside it, in two levels.
+"""What the interactive figures of a page draw: signals of a log over time, or values over something else, as data beside it.
 
-The static figures draw from the same arrays. A column is stored as 16-bit steps between its least and greatest value, base64;
-the page loads an overview of it, the least and greatest value of every bin, and all rows once a reader zooms in.
+The static figures draw from the same arrays. A column of a log is stored as 16-bit steps between its least and greatest value,
+base64; the page loads an overview of it, the least and greatest value of every bin, and all rows once a reader zooms in. Other
+figures have few rows, which are stored as they are.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import base64
 import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,9 +31,38 @@ BREAK = 2.5
 """A line breaks where two rows are this many times the usual step apart."""
 
 
+PALETTE = 6
+"""Colours ``c0`` to ``c5`` of the pages."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """What is along the horizontal axis.
+
+    Attributes
+    ----------
+    label
+        Name, with the unit where there is one.
+    kind
+        ``time`` [s] of a log, whole ``number``, ``date`` [s since 1970, UTC], or ``name``: rows from 1 on, by their names.
+    names
+        Of the rows, which the cursor tells, shape (n,); empty where the values say all.
+    links
+        Where a click on a row's point leads, shape (n,); empty where to nothing.
+    """
+
+    label: str
+    kind: Literal["time", "number", "date", "name"]
+    names: tuple[str, ...] = ()
+    links: tuple[str, ...] = ()
+
+
+TIME = Axis("time [s]", "time")
+
+
 @dataclass(frozen=True)
 class Trace:
-    """One line over time.
+    """One line along the horizontal axis, or points.
 
     Attributes
     ----------
@@ -46,6 +76,10 @@ class Trace:
         False for one that is off at first, and for one that the frame does not follow.
     dash
         Lengths of dashes and gaps [pixels]; a full line where empty.
+    style
+        A ``line``, a ``marked`` one with a mark at every row, or marks alone: ``points`` or ``hollow`` ones.
+    low, high
+        Ends of the intervals, shape (n,), NaN where there is none: a band along a line, bars of marks. None without.
     """
 
     label: str
@@ -54,19 +88,34 @@ class Trace:
     shown: bool = True
     framing: bool = True
     dash: tuple[float, ...] = ()
+    style: Literal["line", "marked", "points", "hollow"] = "line"
+    low: Floats | None = None
+    high: Floats | None = None
 
 
 @dataclass(frozen=True)
 class Strip:
-    """One pair of axes: what is drawn in it, with the label of its vertical axis."""
+    """One pair of axes.
+
+    Attributes
+    ----------
+    label, traces
+        Of its vertical axis, and what is drawn in it.
+    scale
+        Vertical axis: ``free``, from ``zero`` up, or ``log``, whose values must be positive.
+    frame
+        Least and greatest value that it shows, however far the values reach; None without a bound.
+    """
 
     label: str
     traces: tuple[Trace, ...]
+    scale: Literal["free", "zero", "log"] = "free"
+    frame: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
 class Span:
-    """A stretch of time [s] that is shaded; `kind` is ``validation``, ``left-out`` or another role of the pages' colours."""
+    """A stretch of the horizontal axis that is shaded; `kind` is a role of the pages' colours, such as ``validation``."""
 
     first: float
     last: float
@@ -97,22 +146,24 @@ class Arrows:
 
 @dataclass(frozen=True)
 class Timeline:
-    """What is drawn of one log.
+    """What is drawn of one log, or along another axis than time.
 
     Attributes
     ----------
     title
-        Name of the log.
+        Name of the log, or of the figure.
     t
-        Time [s], ascending, shape (n,).
+        Time [s], or what else `axis` is of, ascending, shape (n,).
     strips
-        Axes below one another, with one time axis.
+        Axes below one another, with one horizontal axis.
     spans, marks
         What is shaded, and what can be jumped to.
     place
         North, east [m] and heading [rad], shape (n, 3), or None.
     arrows
         Along the track.
+    axis
+        The horizontal one.
     """
 
     title: str
@@ -122,6 +173,7 @@ class Timeline:
     marks: tuple[Mark, ...] = ()
     place: Floats | None = None
     arrows: tuple[Arrows, ...] = ()
+    axis: Axis = TIME
 
 
 def left_out_spans(left_out: Sequence[LeftOut]) -> tuple[Span, ...]:
@@ -141,9 +193,12 @@ def scripts(timelines: Sequence[Timeline]) -> dict[str, str]:
         return {}
     files, overviews = {}, []
     for number, one in enumerate(timelines, 1):
+        plain = _plain(one)
+        if one.axis.kind != "time":
+            overviews.append({**plain, "data": _listed(one.t, _columns(one))})
+            continue
         drawn = sum(len(strip.traces) for strip in one.strips)
         t, columns = _broken(one.t, _columns(one))
-        plain = _plain(one)
         if len(t) > 2 * BINS:
             fine = f"timeline-{number}.js"
             files[fine] = f"ferryid.rows({number - 1}, {_dumped(_encoded(t, columns))});\n"
@@ -192,7 +247,9 @@ def _columns(one: Timeline) -> list[Floats]:
     columns = [np.asarray(trace.values, dtype=np.float64) for strip in one.strips for trace in strip.traces]
     if one.place is not None:
         columns += [one.place[:, 0], one.place[:, 1], np.degrees(np.mod(one.place[:, 2], 2.0 * np.pi))]
-    return columns + [side for arrows in one.arrows if len(arrows.north) > 1 for side in (arrows.north, arrows.east)]
+    columns += [side for arrows in one.arrows if len(arrows.north) > 1 for side in (arrows.north, arrows.east)]
+    ends = [(trace.low, trace.high) for strip in one.strips for trace in strip.traces]
+    return columns + [end for low, high in ends if low is not None and high is not None for end in (low, high)]
 
 
 def _broken(t: Floats, columns: Sequence[Floats]) -> tuple[Floats, list[Floats]]:
@@ -210,9 +267,12 @@ def _broken(t: Floats, columns: Sequence[Floats]) -> tuple[Floats, list[Floats]]
 def _plain(one: Timeline) -> dict[str, Any]:
     return {
         "title": one.title,
+        "axis": {**vars(one.axis)},
         "strips": [
             {
                 "label": strip.label,
+                "scale": strip.scale,
+                "frame": strip.frame,
                 "traces": [
                     {
                         "label": trace.label,
@@ -220,6 +280,8 @@ def _plain(one: Timeline) -> dict[str, Any]:
                         "shown": trace.shown,
                         "framing": trace.framing,
                         "dash": list(trace.dash),
+                        "style": trace.style,
+                        "ends": trace.low is not None and trace.high is not None,
                     }
                     for trace in strip.traces
                 ],
@@ -244,6 +306,13 @@ def _plain(one: Timeline) -> dict[str, Any]:
 
 def _encoded(t: Floats, columns: Iterable[Floats]) -> dict[str, Any]:
     return {"t": _steps(t, np.dtype("<u4")), "columns": [_steps(one, np.dtype("<i2")) for one in columns]}
+
+
+def _listed(t: Floats, columns: Iterable[Floats]) -> dict[str, Any]:
+    return {
+        "t": t.tolist(),
+        "columns": [[float(f"{v:.6g}") if np.isfinite(v) else None for v in one] for one in columns],
+    }
 
 
 def _steps(values: Floats, kind: np.dtype[Any]) -> list[Any]:

@@ -12,8 +12,10 @@ from ferryid.errors import FerryIdError
 from ferryid.files import finite
 from ferryid.report.folder import PAGE, made, write_folder
 from ferryid.report.html import template
+from ferryid.report.interactive import STATIC, Interactive, make_interactive
 from ferryid.report.outcome import Report
 from ferryid.report.versus_figures import intervals
+from ferryid.report.versus_timeline import versus_timeline
 from ferryid.types import RunContext
 from ferryid.vessel.profile import Profile
 
@@ -48,11 +50,13 @@ def compare_and_report(
         raise FerryIdError(f'diagnose: --versus stores no model, found --name "{name}". Fix: leave out one of the two')
     found = compare_groups(logs, versus, profile, settings, run)
     run.progress("writing the report")
-    page, drawings = render(found, command)
     folder = run.out / "reports" / _folder(found)
+    # A batch keeps the scripts where its tables are.
+    interactive = make_interactive({0: versus_timeline(found)}, folder, run.tables_out or run.out)
+    page, drawings = render(found, command, interactive)
     file = folder / PAGE
     plain = {**finite(versus_json(found)), "report": str(file)}
-    write_folder(folder, page, drawings, plain, "versus.json")
+    write_folder(folder, page, drawings, plain, "versus.json", scripts=interactive.files())
     return Report(plain, f"{as_text(found)}\nreport  {file}", file)
 
 
@@ -95,7 +99,7 @@ def _group_line(found: Versus, group: str) -> str:
     return f"{group} ({counted(len(logs), 'log')}, {sum(one.duration_s for one in logs):.0f} s)"
 
 
-def render(found: Versus, command: Sequence[str] = ()) -> tuple[str, dict[str, str]]:
+def render(found: Versus, command: Sequence[str] = (), interactive: Interactive = STATIC) -> tuple[str, dict[str, str]]:
     """Return the page, and its drawings (SVG) by name."""
     drawings = {"differences": intervals(found)}
     rows = [_row(one, True) for one in found.judged.differences] + [_row(one, False) for one in found.judged.compared]
@@ -114,6 +118,8 @@ def render(found: Versus, command: Sequence[str] = ()) -> tuple[str, dict[str, s
         ],
         loads=[one.says for one in found.judged.loads],
         svg=drawings["differences"],
+        timeline_number=interactive.number(0),
+        assets=interactive.assets,
         rows=rows,
         groups=found.groups,
         notes=found.notes,

@@ -20,14 +20,16 @@
     return Array.from(steps, (k) => (k === missing ? null : stored[0] + k * stored[1]));
   }
 
-  /* Return times, and columns by what they are: of every strip, of the place, of the arrows. */
+  /* Return times, and columns by what they are: of every strip, of the place, of the arrows, and ends of intervals by trace. */
   ferryid.decode = function (plain, data) {
-    const columns = data.columns.map(values);
+    const listed = typeof data.t[2] !== "string"; /* few rows, as they are */
+    const columns = listed ? data.columns : data.columns.map(values);
     let next = 0;
     const strips = plain.strips.map((strip) => strip.traces.map(() => columns[next++]));
     const place = plain.place ? [columns[next++], columns[next++], columns[next++]] : null;
     const arrows = plain.arrows.map((one) => (one.steady ? null : [columns[next++], columns[next++]]));
-    return { t: times(data.t), strips, place, arrows };
+    const ends = plain.strips.map((strip) => strip.traces.map((trace) => (trace.ends ? [columns[next++], columns[next++]] : null)));
+    return { t: listed ? data.t : times(data.t), strips, place, arrows, ends };
   };
 
   /* Index of the last value that is not greater. */

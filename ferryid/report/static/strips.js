@@ -1,8 +1,10 @@
-/* Axes below one another with one time axis: uPlot draws each, this links them, shades, and follows pointer and fingers. */
+/* Axes below one another with one horizontal axis: uPlot draws each, this links them, shades, draws intervals, and follows
+   pointer and fingers. */
 "use strict";
 (function () {
   const el = ferryid.element;
   const left = 74; /* width of the vertical axes, alike in all strips [px] */
+  const near = 16; /* how far from a point a click still means it [px] */
 
   function axis(more) {
     return {
@@ -14,17 +16,26 @@
   }
 
   function series(trace) {
+    const alone = trace.style === "points" || trace.style === "hollow";
+    const fill = () => ferryid.colour(trace.style === "hollow" ? "paper" : trace.colour);
     return {
+      ...(alone ? { paths: () => null } : {}),
       label: trace.label,
       show: trace.shown,
       auto: trace.framing,
       stroke: () => ferryid.colour(trace.colour),
       width: trace.colour === "measured" ? 1.8 : 1.3,
       dash: trace.dash,
-      points: { show: false },
+      points: trace.style === "line" ? { show: false } : { show: true, size: alone ? 8 : 5, fill },
       spanGaps: false,
     };
   }
+
+  const logarithmic = {
+    splits: (plot, k, low, high) => ferryid.logTicks(low, high),
+    filter: (plot, at) => at,
+    values: (plot, at) => at.map(ferryid.text),
+  };
 
   ferryid.Strips = class {
     constructor(plain, state) {
@@ -49,7 +60,7 @@
         return output;
       });
       const extra = el("div", { class: "switches extra" });
-      const drawing = el("div", { class: "drawing", role: "img", "aria-label": strip.label + " over time" });
+      const drawing = el("div", { class: "drawing", role: "img", "aria-label": strip.label + " over " + this.plain.axis.label });
       this.root.append(el("div", { class: "strip" }, el("div", { class: "head" }, el("strong", {}, strip.label), values, extra), drawing));
       return { strip, k, outputs, drawing, values, extra, plot: null };
     }
@@ -68,11 +79,19 @@
             drag: { x: true, y: false, setScale: false },
             bind: { dblclick: () => () => this.state.see(...this.state.whole) },
           },
-          scales: { x: { time: false, min: this.state.from, max: this.state.to, auto: false } },
-          axes: [axis({ size: last ? 44 : 14, label: last ? "time [s]" : undefined, labelSize: 16, values: last ? undefined : () => [] }), axis({ size: left, space: 26 })],
+          scales: {
+            x: { time: this.plain.axis.kind === "date", min: this.state.from, max: this.state.to, auto: false },
+            y: { distr: row.strip.scale === "log" ? 3 : 1, range: this.range(row) },
+          },
+          tzDate: (seconds) => uPlot.tzDate(new Date(seconds * 1000), "Etc/UTC"),
+          axes: [
+            axis({ ...this.state.axis.options(), size: this.bottom(last), labelSize: 16, ...(last ? {} : { label: undefined, values: () => [] }) }),
+            axis({ size: left, space: 26, ...(row.strip.scale === "log" ? logarithmic : {}) }),
+          ],
           series: [{}, ...row.strip.traces.map(series)],
           hooks: {
             drawClear: [(plot) => this.shade(plot)],
+            drawAxes: [(plot) => this.intervals(row, plot)],
             setSelect: [(plot) => this.selected(plot)],
             setCursor: [(plot) => this.moved(row, plot)],
           },
@@ -80,6 +99,7 @@
         row.plot = new uPlot(options, this.columns(row), row.drawing);
         row.drawn = this.state.data;
         this.listen(row.plot);
+        if (this.plain.axis.links.length) this.follows(row.plot);
       });
       new ResizeObserver(() => this.rows.forEach((row) => this.resize(row))).observe(this.root);
     }
@@ -113,8 +133,36 @@
       });
     }
 
+    /* Height of the horizontal axis. */
+    bottom(last) {
+      return last ? this.state.axis.bottom : 14;
+    }
+
     height(last) {
-      return (this.rows.length > 3 ? 120 : 150) + (last ? 44 : 14);
+      const alone = this.rows.length === 1 && this.plain.axis.kind !== "time";
+      return (alone ? 280 : this.rows.length > 3 ? 120 : 150) + this.bottom(last);
+    }
+
+    /* What the vertical axis of a strip shows: its intervals too, and no more than its frame. */
+    range(row) {
+      const { scale, frame, traces } = row.strip;
+      return (plot, low, high) => {
+        const { t, ends } = this.state.data;
+        traces.forEach((trace, i) => {
+          if (!trace.ends || !trace.framing || this.state.hidden.has(trace.label)) return;
+          t.forEach((at, k) => {
+            const [from, to] = ends[row.k][i].map((one) => one[k]);
+            if (at < this.state.from || at > this.state.to || from === null || to === null) return;
+            low = low === null ? from : Math.min(low, from);
+            high = high === null ? to : Math.max(high, to);
+          });
+        });
+        if (low === null || high === null) return [null, null];
+        if (frame) [low, high] = [Math.min(Math.max(low, frame[0]), frame[1]), Math.max(Math.min(high, frame[1]), frame[0])];
+        if (scale === "log") return [low / 1.05, high * 1.05];
+        const [bottom, top] = uPlot.rangeNum(low, high, 0.1, true);
+        return scale === "zero" ? [Math.min(0, low), top] : [bottom, top];
+      };
     }
 
     resize(row) {
@@ -156,6 +204,39 @@
       ctx.restore();
     }
 
+    /* Bands along lines, and bars of marks. */
+    intervals(row, plot) {
+      const { ctx, bbox } = plot;
+      const { t, ends } = this.state.data;
+      ctx.save();
+      ctx.beginPath();
+      ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+      ctx.clip();
+      row.strip.traces.forEach((trace, i) => {
+        if (!trace.ends || this.state.hidden.has(trace.label)) return;
+        const [low, high] = ends[row.k][i];
+        const at = (k) => [plot.valToPos(t[k], "x", true), plot.valToPos(Math.max(low[k], plot.scales.y.min), "y", true), plot.valToPos(high[k], "y", true)];
+        const known = t.map((_, k) => k).filter((k) => low[k] !== null && high[k] !== null);
+        ctx.strokeStyle = ctx.fillStyle = ferryid.colour(trace.colour);
+        ctx.lineWidth = 1.6 * uPlot.pxRatio;
+        ctx.globalAlpha = trace.style === "line" || trace.style === "marked" ? 0.15 : 1;
+        ctx.beginPath();
+        if (ctx.globalAlpha < 1) {
+          known.forEach((k) => ctx.lineTo(at(k)[0], at(k)[2]));
+          known.reverse().forEach((k) => ctx.lineTo(at(k)[0], at(k)[1]));
+          ctx.fill();
+        } else {
+          known.forEach((k) => {
+            const [x, bottom, top] = at(k);
+            ctx.moveTo(x, bottom);
+            ctx.lineTo(x, top);
+          });
+          ctx.stroke();
+        }
+      });
+      ctx.restore();
+    }
+
     selected(plot) {
       const { left: from, width } = plot.select;
       if (width < 4) return;
@@ -167,7 +248,10 @@
     moved(row, plot) {
       const k = plot.cursor.idx;
       row.outputs.forEach((output, i) => {
-        output.textContent = k === null || k === undefined ? "" : ferryid.text(plot.data[i + 1][k]);
+        const none = k === null || k === undefined;
+        const ends = this.state.data.ends[row.k][i];
+        const interval = none || !ends || ends[0][k] === null ? "" : " (" + ferryid.text(ends[0][k]) + " to " + ferryid.text(ends[1][k]) + ")";
+        output.textContent = none ? "" : ferryid.text(plot.data[i + 1][k]) + interval;
       });
       /* The strip under the pointer, or the one that was set by hand, moves the vessel on the map. */
       if (row.k === 0) this.state.follow(k === null || k === undefined ? null : plot.data[0][k]);
@@ -177,6 +261,27 @@
     cursor() {
       this.rows.forEach(({ plot }) => {
         if (plot) plot.setCursor({ left: plot.valToPos(this.state.asked, "x"), top: plot.over.clientHeight / 2 }, true, false);
+      });
+    }
+
+    /* A click on a point leads where its row does. */
+    follows(plot) {
+      const over = plot.over;
+      let down = null;
+      over.addEventListener("pointerdown", (event) => (down = event), true);
+      over.addEventListener("click", (event) => {
+        if (!down || Math.hypot(event.clientX - down.clientX, event.clientY - down.clientY) > 4) return;
+        const box = over.getBoundingClientRect();
+        let [best, least] = [-1, near];
+        plot.data.slice(1).forEach((values, i) => {
+          if (!plot.series[i + 1].show) return;
+          values.forEach((value, k) => {
+            if (value === null) return;
+            const far = Math.hypot(plot.valToPos(plot.data[0][k], "x") - (event.clientX - box.left), plot.valToPos(value, "y") - (event.clientY - box.top));
+            if (far < least) [best, least] = [k, far];
+          });
+        });
+        if (best >= 0) this.state.lead(best);
       });
     }
 

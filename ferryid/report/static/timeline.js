@@ -1,8 +1,7 @@
-/* Interactive figures of a log: state of the view, its controls and keys, and the rows that are loaded when a reader zooms in. */
+/* Interactive figures of a log, or along another axis: state of the view, its controls and keys, and the rows that are loaded when a reader zooms in. */
 "use strict";
 (function () {
   const el = ferryid.element;
-  const shortest = 20; /* rows that a view shows at least */
   const most = 200000; /* rows in view, above which the overview is drawn */
   const all = [];
 
@@ -12,8 +11,8 @@
       this.key = "ferryid-" + number;
       this.data = this.overview = ferryid.decode(plain, plain.data);
       this.rows = null;
-      const t = this.data.t;
-      this.whole = [t[0], t[t.length - 1]];
+      this.axis = ferryid.axis(plain.axis, this.data.t);
+      this.whole = this.axis.whole;
       [this.from, this.to] = this.whole;
       this.cursorAt = null;
       this.asked = null;
@@ -38,7 +37,7 @@
       this.live = el("p", { class: "live", "aria-live": "polite" }, "");
       this.strips = new ferryid.Strips(this.plain, this);
       this.map = this.plain.place ? new ferryid.Map(this.plain, this) : null;
-      const pan = button("drag: zoom", "whether dragging zooms or moves the time axis", () => {
+      const pan = button("drag: zoom", "whether dragging zooms or moves the " + this.axis.along, () => {
         this.strips.pan = !this.strips.pan;
         pan.textContent = this.strips.pan ? "drag: move" : "drag: zoom";
         pan.setAttribute("aria-pressed", this.strips.pan);
@@ -46,12 +45,12 @@
       });
       const tools = (this.tools = el(
         "div",
-        { class: "tools", role: "toolbar", "aria-label": "time axis" },
+        { class: "tools", role: "toolbar", "aria-label": this.axis.along },
         button("+", "zoom in", () => this.zoom(2)),
         button("−", "zoom out", () => this.zoom(0.5)),
-        button("◀", "earlier", () => this.shift(-0.5)),
-        button("▶", "later", () => this.shift(0.5)),
-        button("whole log", "show the whole log", () => this.jump(-1)),
+        button("◀", this.axis.sides[0], () => this.shift(-0.5)),
+        button("▶", this.axis.sides[1], () => this.shift(0.5)),
+        button(this.axis.all.name, this.axis.all.title, () => this.jump(-1)),
         pan,
         this.range,
         ferryid.themeButton(),
@@ -71,7 +70,7 @@
         "details",
         { class: "keys" },
         el("summary", {}, "keys"),
-        el("p", {}, "← → cursor · Shift with ← → earlier, later · + − zoom · 0 whole log · 1 to 9 findings · Ctrl with the wheel zooms · Shift with the wheel or dragging moves · double click: whole log"),
+        el("p", {}, this.axis.keys),
       );
       this.section.append(tools, findings, shades, el("div", { class: this.map ? "both" : "" }, this.strips.root, this.map ? this.map.root : ""), this.live, help);
       this.section.hidden = false;
@@ -94,11 +93,10 @@
       this.lay();
     }
 
-    /* Show a stretch of time. */
+    /* Show a stretch of the horizontal axis. */
     see(from, to) {
       const [first, last] = this.whole;
-      const t = (this.rows || this.overview).t;
-      const least = Math.min(((last - first) / Math.max(t.length - 1, 1)) * shortest, last - first);
+      const least = this.axis.least((this.rows || this.overview).t.length);
       let width = Math.min(Math.max(to - from, least), last - first);
       const middle = 0.5 * (from + to);
       from = Math.min(Math.max(middle - 0.5 * width, first), last - width);
@@ -129,7 +127,7 @@
         const room = 0.15 * (last - first) + 5;
         this.see(Math.max(first - room, this.whole[0]), Math.min(last + room, this.whole[1]));
       }
-      this.live.textContent = mark ? "Shown: " + this.marks[k].textContent + "." : "Shown: the whole log.";
+      this.live.textContent = mark ? "Shown: " + this.marks[k].textContent + "." : "Shown: " + this.axis.all.shown + ".";
     }
 
     show(label, on) {
@@ -201,9 +199,10 @@
 
     /* Once all logs of the page are there. */
     offer() {
-      if (all.length < 2) return;
+      const others = all.filter((one) => one !== this && one.plain.axis.kind === "time");
+      if (this.plain.axis.kind !== "time" || !others.length) return;
       const choice = el("select", { "aria-label": "log to lay over this one" }, el("option", { value: -1 }, "no other log"));
-      all.forEach((one, k) => one !== this && choice.append(el("option", { value: k }, one.plain.title)));
+      others.forEach((one) => choice.append(el("option", { value: all.indexOf(one) }, one.plain.title)));
       const later = el("input", { type: "number", value: 0, step: 1, "aria-label": "shift of the other log in seconds" });
       const act = () => this.beside(Number(choice.value), Number(later.value));
       choice.addEventListener("change", act);
@@ -217,21 +216,25 @@
     }
 
     say() {
-      const at = this.cursor === null ? "" : " · cursor " + ferryid.text(this.cursor) + " s";
-      this.range.textContent = ferryid.text(this.from) + " to " + ferryid.text(this.to) + " s" + at;
+      this.range.textContent = this.axis.tell(this.from, this.to, this.cursor);
+    }
+
+    /* Go where the point of a row leads. */
+    lead(k) {
+      const link = this.axis.links && this.axis.links[k];
+      if (link) location.href = link;
     }
 
     pressed(event) {
       if (event.ctrlKey || event.metaKey || event.altKey || /INPUT|SELECT|SUMMARY/.test(event.target.tagName)) return;
-      const step = (this.to - this.from) / 200;
-      const now = this.cursor === null ? 0.5 * (this.from + this.to) : this.cursor;
       const side = event.key === "ArrowLeft" ? -1 : 1;
       if (event.key === "ArrowLeft" || event.key === "ArrowRight") {
         if (event.shiftKey) this.shift(0.25 * side);
-        else this.point(now + side * step);
+        else this.point(this.axis.next(this.cursor, side, this.from, this.to));
       } else if (event.key === "+" || event.key === "=") this.zoom(2);
       else if (event.key === "-") this.zoom(0.5);
       else if (event.key === "0" || event.key === "Home") this.jump(-1);
+      else if (event.key === "Enter" && this.axis.links && this.cursor !== null && event.target === this.section) this.lead(this.axis.nearest(this.cursor));
       else if (/^[1-9]$/.test(event.key) && Number(event.key) <= this.marks.length) this.jump(Number(event.key) - 1);
       else return;
       event.preventDefault();
