@@ -20,18 +20,19 @@ def structures_timeline(one: StructureComparison) -> Timeline:
     supported = np.array([structure is one.supported for structure in one.structures])
     kept = np.array([structure.kept for structure in one.structures])
 
-    def marks(j: int, label: str, which: Flags, colour: str, *, hollow: bool = False) -> Trace:
-        shown = (np.where(which, each[:, j], np.nan) for each in (value, low, high))
-        middle, bottom, top = shown
-        return Trace(label, middle, colour, style="hollow" if hollow else "points", low=bottom, high=top)
+    def marks(j: int, label: str, which: Flags, colour: str, *, hollow: bool = False) -> list[Trace]:
+        if not which.any():
+            return []
+        middle, bottom, top = (np.where(which, each[:, j], np.nan) for each in (value, low, high))
+        return [Trace(label, middle, colour, style="hollow" if hollow else "points", low=bottom, high=top)]
 
     strips = tuple(
         Strip(
             f"{axis}: MSE over the best structure's",
             (
-                marks(j, "supported", supported, "base"),
-                marks(j, "cannot be distinguished from the best", kept & ~supported, "new"),
-                marks(j, "poorer", ~kept & ~supported, "grey", hollow=True),
+                *marks(j, "supported", supported, "base"),
+                *marks(j, "cannot be distinguished from the best", kept & ~supported, "new"),
+                *marks(j, "poorer", ~kept & ~supported, "grey", hollow=True),
                 Trace("as good as the best", np.ones(len(value)), "grey", dash=(4.0, 3.0)),
             ),
             "log",

@@ -14,7 +14,7 @@ from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.report.batch_page import render
 from ferryid.report.diagnosis_report import report
 from ferryid.types import Floats
-from tests.report.browser import CHROMIUM, Page, browser
+from tests.report.browser import CHROMIUM, Page
 from tests.report.pages import NEEDS_UPLOT
 from tests.report.test_batch_page import hostile
 from tests.report.test_diagnosis import T, diagnosis
@@ -47,12 +47,6 @@ def measured(one: Diagnosis, t: Floats) -> Diagnosis:
             "wind": np.column_stack([-3.0 + 0.0 * t, 3.0 + 0.0 * t]),
         },
     )
-
-
-@pytest.fixture(scope="module")
-def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
-    with browser(tmp_path_factory.mktemp("chromium")) as opened:
-        yield opened
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ import pytest
 
 from ferryid.report import interactive
 from ferryid.report.interactive import LICENCE, SCRIPTS, STATIC, STYLES, make_interactive
-from ferryid.report.timeline import BINS, MISSING, Mark, Span, Strip, Timeline, Trace, flagged, overview, scripts
+from ferryid.report.timeline import BINS, MISSING, Axis, Mark, Span, Strip, Timeline, Trace, flagged, overview, scripts
 from ferryid.types import Floats
 from tests.report.pages import NEEDS_UPLOT
 
@@ -67,6 +67,27 @@ def test_a_long_log_has_an_overview_that_keeps_every_peak_and_all_rows_in_a_file
     north, east = (column(one) for one in first["data"]["columns"][1:3])
     assert north == pytest.approx(-east, abs=0.2)
     assert len(made["timeline.js"]) < 40_000
+
+
+def test_figures_of_few_rows_arrive_as_they_are() -> None:
+    """Dates far apart are no gap, and what a logarithmic axis shows needs all its digits."""
+    t = np.array([0.0, 1.0, 2.0, 900.0])
+    values = np.array([0.95, np.nan, 1.25, 4e6])
+    trace = Trace("found", values, "new", style="points", low=values - 0.1, high=values + 0.5)
+    strips = (Strip("a", (Trace("other", t, "c0"), trace), "log", (0.5, 2.0)),)
+    axis = Axis("date", "date", tuple("abcd"), tuple(f"#{name}" for name in "abcd"))
+    made = scripts([Timeline("batch", t, strips, axis=axis)])
+    assert list(made) == ["timeline.js"]
+    (one,) = decoded(made["timeline.js"], "show")[0]
+    assert one["axis"] == {"label": "date", "kind": "date", "names": [*"abcd"], "links": ["#a", "#b", "#c", "#d"]}
+    assert (one["strips"][0]["scale"], one["strips"][0]["frame"]) == ("log", [0.5, 2.0])
+    assert [each["ends"] for each in one["strips"][0]["traces"]] == [False, True]
+    assert one["data"]["t"] == t.tolist()
+    first, second, low, high = one["data"]["columns"]
+    assert first == t.tolist()
+    assert second == [0.95, None, 1.25, 4e6]
+    assert low == [0.85, None, 1.15, 4e6]
+    assert high == [1.45, None, 1.75, 4e6]
 
 
 def test_the_overview_leaves_out_what_no_row_of_a_bin_has() -> None:

@@ -4,7 +4,7 @@
   const day = 86400;
   const steps = [1, 5, 15, 60, 180, 360, 720].map((minutes) => minutes * 60).concat([1, 2, 5, 10, 30, 60, 90, 180, 365, 730, 1825].map((days) => days * day));
   const whole = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000];
-  const longest = 28; /* letters of a name below the axis */
+  const longest = 36; /* letters of a name below the axis */
 
   function date(seconds, hours) {
     const text = new Date(seconds * 1000).toISOString();
@@ -80,7 +80,8 @@
 
     tell(from, to, cursor) {
       const seen = this.t.filter((t) => t >= from && t <= to);
-      const stretch = !seen.length ? "none" : seen.length === this.t.length ? "all" : this.row(seen[0]) + " to " + this.row(seen[seen.length - 1]);
+      const ends = seen.length ? this.row(seen[0]) + " to " + this.row(seen[seen.length - 1]) : "none";
+      const stretch = ends + (this.kind === "name" ? " of " + this.t.length : "");
       if (cursor === null) return stretch;
       const k = this.nearest(cursor);
       return stretch + " · cursor " + [this.kind === "name" ? "" : this.row(this.t[k]), this.names[k]].filter(Boolean).join(" ");

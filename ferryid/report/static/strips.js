@@ -55,7 +55,8 @@
         const box = el("input", { type: "checkbox", checked: trace.shown, "data-trace": trace.label });
         const output = el("output", {}, "");
         box.addEventListener("change", () => this.state.show(trace.label, box.checked));
-        const swatch = el("span", { class: "swatch" + (trace.dash.length ? " dashed" : ""), style: "--of: var(--" + trace.colour + ")" });
+        const look = { points: " dot", hollow: " ring" }[trace.style] || (trace.dash.length ? " dashed" : "");
+        const swatch = el("span", { class: "swatch" + look, style: "--of: var(--" + trace.colour + ")" });
         values.append(el("label", {}, box, swatch, trace.label + " ", output));
         return output;
       });
@@ -264,24 +265,31 @@
       });
     }
 
-    /* A click on a point leads where its row does. */
+    /* The row whose point is under the pointer, -1 where none is. */
+    pointed(plot, event) {
+      const box = plot.over.getBoundingClientRect();
+      let [best, least] = [-1, near];
+      plot.data.slice(1).forEach((values, i) => {
+        if (!plot.series[i + 1].show) return;
+        values.forEach((value, k) => {
+          if (value === null) return;
+          const far = Math.hypot(plot.valToPos(plot.data[0][k], "x") - (event.clientX - box.left), plot.valToPos(value, "y") - (event.clientY - box.top));
+          if (far < least) [best, least] = [k, far];
+        });
+      });
+      return best;
+    }
+
+    /* A click on a point leads where its row does; the end of a drag is none. */
     follows(plot) {
       const over = plot.over;
       let down = null;
       over.addEventListener("pointerdown", (event) => (down = event), true);
+      over.addEventListener("pointermove", (event) => (over.style.cursor = this.pointed(plot, event) < 0 ? "" : "pointer"));
       over.addEventListener("click", (event) => {
-        if (!down || Math.hypot(event.clientX - down.clientX, event.clientY - down.clientY) > 4) return;
-        const box = over.getBoundingClientRect();
-        let [best, least] = [-1, near];
-        plot.data.slice(1).forEach((values, i) => {
-          if (!plot.series[i + 1].show) return;
-          values.forEach((value, k) => {
-            if (value === null) return;
-            const far = Math.hypot(plot.valToPos(plot.data[0][k], "x") - (event.clientX - box.left), plot.valToPos(value, "y") - (event.clientY - box.top));
-            if (far < least) [best, least] = [k, far];
-          });
-        });
-        if (best >= 0) this.state.lead(best);
+        const still = down && Math.hypot(event.clientX - down.clientX, event.clientY - down.clientY) < 4;
+        const k = still ? this.pointed(plot, event) : -1;
+        if (k >= 0) this.state.lead(k);
       });
     }
 

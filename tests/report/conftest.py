@@ -1,0 +1,16 @@
+"""The browser that the tests of interactive figures open pages in."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from tests.report.browser import Page, browser
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
+    """Give one tab for the tests of a file."""
+    with browser(tmp_path_factory.mktemp("chromium")) as opened:
+        yield opened
