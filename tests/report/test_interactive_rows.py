@@ -100,13 +100,15 @@ def test_a_click_on_a_point_leads_to_the_row_of_its_log_even_if_filtered_out(ope
     opened.do("document.querySelector('#filters').dispatchEvent(new Event('input'))")
     assert opened.do("document.querySelector('#log-1').hidden")
     x, y = point(opened, 2, 2)
-    opened.drag(x - 60.0, y, x, y)
+    opened.drag(x - 60.0, y, x, y, SHIFT)
     assert opened.do("location.hash") == "", "the end of a drag is no click"
-    opened.click(named("show all"))
     opened.mouse("mouseMoved", *point(opened, 2, 2))
     assert opened.do("document.querySelector('.u-over').style.cursor") == "pointer"
+    # Also while dragging moves.
+    opened.click(named("whether dragging zooms or moves the horizontal axis"))
+    x, y = point(opened, 2, 2)
     for kind in ("mousePressed", "mouseReleased"):
-        opened.mouse(kind, *point(opened, 2, 2), clickCount=1)
+        opened.mouse(kind, x, y, clickCount=1)
     opened.settle()
     assert opened.do("location.hash") == "#log-1"
     assert not opened.do("document.querySelector('#log-1').hidden")
@@ -115,8 +117,8 @@ def test_a_click_on_a_point_leads_to_the_row_of_its_log_even_if_filtered_out(ope
 
 
 def test_a_point_that_is_switched_off_leads_nowhere(opened: Page) -> None:
-    x, y = point(opened, 2, 2)
-    opened.click('.timeline input[data-trace="a hint"]')
+    opened.click('.timeline input[data-trace="not found"]')
+    x, y = point(opened, 3, 0)
     for kind in ("mouseMoved", "mousePressed", "mouseReleased"):
         opened.mouse(kind, x, y, clickCount=1)
     opened.settle()

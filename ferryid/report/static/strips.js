@@ -280,13 +280,13 @@
       return best;
     }
 
-    /* A click on a point leads where its row does; the end of a drag is none. */
+    /* A click on a point leads where its row does; the end of a drag is none. (uPlot keeps clicks back while dragging moves.) */
     follows(plot) {
       const over = plot.over;
       let down = null;
-      over.addEventListener("pointerdown", (event) => (down = event), true);
+      over.addEventListener("pointerdown", (event) => (down = event.button ? null : event));
       over.addEventListener("pointermove", (event) => (over.style.cursor = this.pointed(plot, event) < 0 ? "" : "pointer"));
-      over.addEventListener("click", (event) => {
+      over.addEventListener("pointerup", (event) => {
         const still = down && Math.hypot(event.clientX - down.clientX, event.clientY - down.clientY) < 4;
         const k = still ? this.pointed(plot, event) : -1;
         if (k >= 0) this.state.lead(k);
