@@ -1,7 +1,7 @@
 """A batch: the same steps for every log of an archive, each finished result kept, one table and one page of all.
 
 All of it lies in ``<out>/batch``: ``results``, a folder for each log, and ``summary.parquet`` and ``index.html``. Tables of the
-logs are in ``<out>/logs``, as those of every command.
+logs are in ``<out>/logs``, scripts of the page's interactive figures in ``<out>/reports/assets``, as those of every command.
 """
 
 from __future__ import annotations

@@ -6,6 +6,7 @@ import errno
 import json
 import os
 import pickle
+import re
 import shutil
 import signal
 import subprocess
@@ -32,6 +33,7 @@ from ferryid.vessel import load_profile
 from tests.batch.archive import archive, recipe, rows_of, run, same, stay_here
 from tests.batch.work import blank, children_of, deadly, default_interrupts, ended, environment
 from tests.cli.test_every_command import conforms
+from tests.report.pages import NEEDS_UPLOT
 
 pytestmark = pytest.mark.slow
 
@@ -184,6 +186,20 @@ def test_a_fit_without_its_page(tmp_path: Path, wanted: bool) -> None:
     assert ("report.html" in Path(result.page).read_text("utf-8")) == wanted
     table = pq.read_table(result.summary).column("fit_report").to_pylist()
     assert table == [f"{row.folder}/{row.fit.report}" if wanted else None]
+
+
+@NEEDS_UPLOT
+@pytest.mark.usefixtures("here")
+def test_the_interactive_figures_of_the_page_lie_where_it_looks_for_them(tmp_path: Path) -> None:
+    recipe(tmp_path, FIT)
+    result, _ = run(tmp_path, archive(tmp_path, 2) / "*.mcap")
+    page = Path(result.page)
+    text = page.read_text("utf-8")
+    scripts = re.findall(r'src="([^"]+)"', text)
+    assert scripts[-1] == "timeline.js"
+    assert all((page.parent / script).resolve().is_file() for script in scripts)
+    assert (page.parent / scripts[0]).resolve().is_relative_to((tmp_path / "out" / "reports" / "assets").resolve())
+    assert page.with_name("timeline.js").read_text("utf-8").count('"Force errors, milliampere"') == 1
 
 
 @pytest.mark.usefixtures("here")

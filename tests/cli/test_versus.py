@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +15,7 @@ from ferryid.batch.changes import GroupTask, compare_groups_of
 from ferryid.diagnose import Versus
 from ferryid.report import versus_report
 from ferryid.report.batch_rows import Change
+from ferryid.report.interactive import SCRIPTS, available
 from ferryid.simulate import parse_scenario, simulate, write_log
 from ferryid.vessel import load_profile
 from tests.cli.test_diagnose_input import refused
@@ -86,7 +88,12 @@ def test_two_groups_and_several_logs_after_one_option(
     assert (batch.tables, batch.ranges) == (call.tables, call.ranges)
     assert (done.verdict, done.summary) == (found["verdict"], found["summary"])
     assert weak["says"] in done.differences
-    assert (tmp_path / "api" / "batch" / str(done.report)).is_file()
+    made = tmp_path / "api" / "batch" / str(done.report)
+    # Its scripts are those of the output folder, not copied for every comparison.
+    scripts = re.findall(r'src="([^"]+)"', made.read_text(encoding="utf-8"))
+    assert len(scripts) == (len(SCRIPTS) + 1) * available()
+    assert all((made.parent / script).is_file() for script in scripts)
+    assert len(list(tmp_path.glob("api/**/uplot.js"))) == available()
 
 
 @pytest.mark.parametrize(
