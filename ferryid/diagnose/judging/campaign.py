@@ -9,6 +9,7 @@ from functools import cached_property
 from ferryid.diagnose.inference.campaign import CommonHull
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit, bare_campaign, estimate_campaign
 from ferryid.diagnose.inference.campaign_model import Campaign
+from ferryid.diagnose.inference.campaign_properties import properties_of
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.force_errors import mass_of
 from ferryid.diagnose.inference.thresholds import INFERENCE
@@ -64,6 +65,12 @@ class JudgedCampaign:
             return None
         mean, covariance = self.hull.fit.belief()
         return HullPosterior(prior.mean[:h], prior.spread[:h], mean[:h], covariance[:h, :h])
+
+    @cached_property
+    def weighed(self) -> frozenset[tuple[str, str | None]]:
+        """Lasting properties that the logs were weighed for together, and do not confirm."""
+        campaign = self.hull.fit.campaign
+        return frozenset(one.key for one in properties_of(campaign)) - {one.key for one in campaign.properties}
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -99,6 +99,8 @@ class LogFigures:
         True where something unsteady that nobody measured was found or left over.
     campaign
         Lasting properties of the vessel that each log of the campaign shows, this log's among them.
+    weighed
+        Lasting properties that all logs of the campaign were weighed for together, and do not confirm.
     baseline_sensors
         Sensor errors that the simulation has which the log is compared with: parameters by effect.
     setting
@@ -113,6 +115,7 @@ class LogFigures:
     velocity_noise: Mapping[str, float] = field(default_factory=dict)
     unsteady: bool = False
     campaign: tuple[frozenset[Key], ...] = ()
+    weighed: frozenset[Key] = frozenset()
     baseline_sensors: Mapping[str, Mapping[str, Estimate]] = field(default_factory=dict)
     setting: str = ""
     hull_doubt: str = ""

@@ -81,7 +81,9 @@ def conclude(
     noted = (*left_out, *(() if together is None else together.notes))
     same = dict(repeated(logs))
     campaign = tuple(_lasting(claims[one.path]) for one in logs) if baseline.joint else ()
-    shared = LogFigures(campaign=campaign, common_hull_doubt="" if together is None else together.hull_doubt)
+    shared = LogFigures(campaign=campaign)
+    if together is not None:
+        shared = replace(shared, weighed=together.weighed, common_hull_doubt=together.hull_doubt)
     single, of_all = likeness_of_logs(judged, together, same)
     found = tuple(
         _with_origin(
@@ -185,7 +187,12 @@ def _concluded(
     estimated = selected.estimated
     screened, problem, kept = estimated.averaged.screened, selected.search.problem, stands.fit
     measurements, survey = screened.measurements, screened.measured.survey
-    figures = replace(log.figures, campaign=shared.campaign, common_hull_doubt=shared.common_hull_doubt)
+    figures = replace(
+        log.figures,
+        campaign=shared.campaign,
+        weighed=shared.weighed,
+        common_hull_doubt=shared.common_hull_doubt,
+    )
     findings, rule_notes = apply_rules(claims, figures)
     chances, still = detection_powers(problem, kept, selected.steady), unexcited_axes(problem)
     before, after = _scores(problem, log.base, kept, stands.proof)

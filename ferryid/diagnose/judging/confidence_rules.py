@@ -336,6 +336,19 @@ def absent_in_other_logs(finding: Finding, context: Context, threshold: float) -
     )
 
 
+@rule()
+def not_of_all_logs(finding: Finding, context: Context, _threshold: float) -> Outcome:
+    """Lower a lasting property that one log shows, where all logs together were weighed for it and do not confirm it.
+
+    A hull that is known from these logs only may be off in the manoeuvres of one of them; what sets in is a log's own.
+    """
+    log = context.log
+    weighed = context.own.kind == "force" and lasting(finding) and finding.key in log.weighed
+    if not weighed or len(log.campaign) < JUDGING.campaign_logs or not finding.sure:
+        return finding, ""
+    return _because(finding, "a property of the vessel would be in all of its logs, which together do not confirm it")
+
+
 def lasting(finding: Finding) -> bool:
     """Return whether a finding is a property of the vessel throughout a log."""
     known = effects().get(finding.effect)
@@ -361,6 +374,7 @@ RULES: tuple[ConfidenceRule, ...] = (
     noise_drowns_an_axis,
     out_of_step_beside_disturbance,
     absent_in_other_logs,
+    not_of_all_logs,
 )
 """In the order in which they are applied: what a rule reads of other findings has been settled by those before it."""
 

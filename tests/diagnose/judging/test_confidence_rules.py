@@ -25,6 +25,7 @@ from ferryid.diagnose.judging.confidence_rules import (
     less_than_is_unexplained,
     log_notes,
     noise_drowns_an_axis,
+    not_of_all_logs,
     nothing_estimated,
     out_of_step_beside_disturbance,
     passes_by_little,
@@ -56,7 +57,7 @@ def on(kind: Kind, **figures: object) -> Context:
 
 def test_every_rule_has_a_name_a_line_and_its_unit() -> None:
     names = [one.name for one in RULES]
-    assert len(names) == len(set(names)) == 18
+    assert len(names) == len(set(names)) == 19
     for one in RULES:
         assert one.about.endswith((".", ":", ",")) or one.about, one.name
         assert (one.threshold is None) == (one.unit == ""), one.name
@@ -295,6 +296,18 @@ def test_a_property_of_the_vessel_that_few_logs_show_is_a_hint(showing: int, log
     # A condition is a log's own, and what begins in a log is an event of it.
     assert stands(absent_in_other_logs, found("wind"), context)
     assert stands(absent_in_other_logs, replace(found("thruster_gain"), onset_s=30.0), context)
+
+
+@pytest.mark.parametrize(("logs", "weighed", "sure"), [(3, True, False), (2, True, True), (3, False, True)])
+def test_what_all_logs_do_not_confirm_is_no_property_of_one(logs: int, weighed: bool, sure: bool) -> None:
+    loss = replace(found("thruster_gain"), instance="aft")
+    keys = frozenset({loss.key}) if weighed else frozenset({("thruster_gain", "fore")})
+    figures = LogFigures(campaign=(frozenset({loss.key}),) * logs, weighed=keys)
+    assert stands(not_of_all_logs, loss, Context(Figures("force"), figures)) == sure
+    # What all logs say is said with them, what sets in is an event of this log, and a wind is its own.
+    assert stands(not_of_all_logs, loss, Context(Figures("property"), figures))
+    assert stands(not_of_all_logs, replace(loss, onset_s=30.0), Context(Figures("force"), figures))
+    assert stands(not_of_all_logs, found("wind"), Context(Figures("force"), figures))
 
 
 def test_a_rule_sees_the_findings_as_those_before_it_left_them() -> None:
