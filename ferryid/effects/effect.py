@@ -194,6 +194,9 @@ class Effect:
     doubt
         ``doubt(values, profile)`` returns why values by name are not credible of a vessel, or may stand in for something else,
         whatever the data say, as the end of a sentence; empty where they are as they may be.
+    scales
+        True where it multiplies all that an actuator gives: of a vessel with one actuator and no hull model, a factor on its
+        masses and damping does the same.
     of_thrust_curve
         True where it is another shape of an actuator's thrust curve, and so may be the profile's error.
     of_log
@@ -239,6 +242,7 @@ class Effect:
     of_sensor: bool = False
     unsteady: Callable[[ForceModel], Processes] | None = None
     doubt: Callable[[Values, Profile], str] = lambda values, profile: ""
+    scales: bool = False
     of_thrust_curve: bool = False
     of_log: tuple[str, ...] = ()
     turbulence: Turbulence | None = None

@@ -73,6 +73,7 @@ EFFECT = Effect(
     instances=instances,
     onset=True,
     vessel=True,
+    scales=True,
     regressor=regressor,
     formula_error=EFFECTS.definition_error,
     passing_size=EFFECTS.passing_gain,

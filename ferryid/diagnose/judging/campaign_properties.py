@@ -166,6 +166,8 @@ def _credibility(made: CampaignFit, candidate: Candidate, values: Mapping[str, f
     profile = made.campaign.members[0].plain.measurements.profile
     if doubt := value_doubt(candidate.effect, candidate.parameters, values, profile):
         return doubt
+    if candidate.effect.scales and not made.campaign.hull.known and len(profile.actuators) == 1:
+        return "without a hull model, a factor on the masses and the damping does the same as one on the only actuator"
     without = made.common.copy()
     without[property_rows(made.campaign, candidate)] = 0.0
     return unfelt(felt(made, without, made.own).max(axis=0))

@@ -24,6 +24,7 @@ from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging import campaign as judging
 from ferryid.diagnose.judging.campaign import judge_campaign
+from ferryid.diagnose.judging.campaign_properties import tested
 from ferryid.effects import effects
 from ferryid.effects.actuator_force import force_limits
 from ferryid.types import no_progress
@@ -154,6 +155,24 @@ def test_a_guessed_hulls_volume_does_not_decide_between_two_thrusters() -> None:
         assert less > 0.1
         # Effects with other parameters are weighed by the evidence.
         assert first.over(ScoredProperty(lag, worse, 55.0)) == -5.0
+
+
+def test_a_factor_on_the_only_actuator_is_one_on_a_guessed_hull() -> None:
+    made, _ = select_properties(estimate_campaign(weakened(0.8)), no_progress)
+    (gain,) = made.campaign.properties
+
+    def doubt(*, known: bool, actuators: int) -> str:
+        profile = replace(FERRY, actuators=FERRY.actuators[:actuators])
+        members = tuple(
+            replace(one, plain=replace(one.plain, measurements=replace(one.plain.measurements, profile=profile)))
+            for one in made.campaign.members
+        )
+        campaign = replace(made.campaign, members=members, hull=replace(made.campaign.hull, known=known))
+        return tested(replace(made, campaign=campaign), gain, ()).doubt
+
+    assert "hull model" in doubt(known=False, actuators=1)
+    assert "hull model" not in doubt(known=True, actuators=1)
+    assert "hull model" not in doubt(known=False, actuators=2)
 
 
 def test_scores_rank_as_fits_do() -> None:
