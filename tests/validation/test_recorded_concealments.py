@@ -53,6 +53,15 @@ def same(before: Measurements, after: Measurements, *names: str) -> bool:
     return all(np.allclose(getattr(before, name), getattr(after, name), atol=1e-9, equal_nan=True) for name in names)
 
 
+@pytest.mark.parametrize("size", [0.1, 0.6, 4.0])
+def test_an_antenna_is_aboard(size: float) -> None:
+    one, half = concealments()["lever_arm"], 0.5 * ferry().profile.hull.beam_m
+    for seed in range(20):
+        arm = one.sample(size, ferry(), np.random.default_rng(seed), (None, None)).values
+        assert np.hypot(arm["x"], arm["y"]) == pytest.approx(size)
+        assert abs(arm["y"]) < half
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_an_unaltered_recording_reads_as_it_was(kind: str, tmp_path: Path) -> None:
     log = KINDS[kind]()

@@ -68,6 +68,24 @@ def test_the_oracle_just_sees_its_size(effect: str) -> None:
 
 
 @pytest.mark.slow
+def test_a_heading_that_the_velocity_is_turned_with_is_seen_in_forces(tmp_path: Path) -> None:
+    # The velocity of a tank's carriage is along the tank: kinematics agrees with any heading.
+    log = read_log(str(zigzag(tmp_path / "tank.dat", 120.0)), load_profile("kvlcc2-model"))
+    every = [Baseline(log, _Log(log.measurements).trial)]
+    one = concealments()["heading_bias"]
+    assert one.visible is not None
+    assert one.visible(log) is None
+    assert np.isfinite(one.visible(ferry()) or np.nan)
+
+    def truth_of(size: float) -> Truth:
+        return Truth("heading_bias", None, {"angle": size})
+
+    size = oracle_size(one, every, truth_of)
+    assert visibility(one, every, truth_of(size)) == pytest.approx(1.0, abs=0.1)
+    assert visibility(one, every, truth_of(0.5 * size)) < 0.75
+
+
+@pytest.mark.slow
 def test_an_error_that_nothing_shows_has_no_size(tmp_path: Path) -> None:
     # Twenty-five seconds are too short for the kinematics.
     log = read_log(str(zigzag(tmp_path / "short.dat", 25.0)), load_profile("kvlcc2-model"))

@@ -73,8 +73,9 @@ def oracle_size(one: Concealment, recording: Sequence[Baseline], truth_of: Calla
     truth_of
         Returns the truth of a size, all else the same.
     """
-    if one.visible is not None:
-        return min(one.visible(base.log.measurements) for base in recording)
+    measured = [] if one.visible is None else [one.visible(base.log) for base in recording]
+    if seen_there := [size for size in measured if size is not None]:
+        return min(seen_there)
     least, most = one.sizes(recording[0].log)
     size, power, before = sqrt(least * most), 1.0, (0.0, 0.0)
     for _ in range(ROUNDS):
@@ -101,10 +102,13 @@ def visibility(one: Concealment, recording: Sequence[Baseline], truth: Truth) ->
     unsteady = truth.effect in effects() and effects()[truth.effect].unsteady is not None
     gain = 0.0
     for base in recording:
-        parts = _parts(one, base.log, truth)
         problem, as_it_was = base.problem, base.problem.plain
-        more = resampled(parts - base.log.measurements.parts, base.log.measurements.t, as_it_was.measurements.t)
-        altered = replace(as_it_was, parts=as_it_was.parts + more)
+        if one.altered is not None:
+            altered = one.altered(as_it_was, truth)
+        else:
+            parts = _parts(one, base.log, truth)
+            more = resampled(parts - base.log.measurements.parts, base.log.measurements.t, as_it_was.measurements.t)
+            altered = replace(as_it_was, parts=as_it_was.parts + more)
         by_step = problem.steps.gap(altered) - problem.steps.gap(as_it_was)
         white = problem.whitening_filter.white(by_step)
         gain += _gain_of_noise(white.reshape(by_step.shape)) if unsteady else 0.0

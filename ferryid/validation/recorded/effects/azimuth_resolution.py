@@ -37,5 +37,5 @@ CONCEALMENT = Concealment(
     sample,
     conceal,
     lambda log: "" if turning(log) else "no thruster of it turns",
-    visible=lambda measurements: degrees(sqrt(12.0) * CHECKS.least_azimuth_error),
+    visible=lambda log: degrees(sqrt(12.0) * CHECKS.least_azimuth_error),
 )

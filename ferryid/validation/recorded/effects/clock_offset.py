@@ -42,5 +42,5 @@ CONCEALMENT = Concealment(
     sample,
     conceal,
     cannot,
-    visible=lambda measurements: kinematic_size(measurements, (LATE,), CHECKS.least_delay_s),
+    visible=lambda log: kinematic_size(log.measurements, (LATE,), CHECKS.least_delay_s),
 )

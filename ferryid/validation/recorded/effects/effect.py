@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ferryid.effects.force_model import Measurements
+from ferryid.effects.force_model import ForceModel
 from ferryid.types import Flags, Floats
 from ferryid.validation.case import Truth
 from ferryid.validation.plant.effects.effect import Span
@@ -65,8 +65,11 @@ class Concealment:
     time_limited
         True where it may begin within the log.
     visible
-        ``visible(measurements)`` returns the size that an oracle sees of a sensor's error in what is measured; None where it is
-        seen in forces, as in `ferryid.validation.recorded.oracle_size`.
+        ``visible(log)`` returns the size that an oracle sees of a sensor's error in what is measured; None where it is seen in
+        forces, as in `ferryid.validation.recorded.oracle_size`.
+    altered
+        ``altered(force_model, truth)`` returns the force model without a sensor's error that forces alone show; None where the
+        record of actuators is what is changed.
     parts
         ``parts(log, truth)`` returns the forces of the actuators, as in the measurements, that the motion is weighed
         against; None where the altered record gives them.
@@ -87,7 +90,8 @@ class Concealment:
     neutral: float = 0.0
     positions: tuple[str, ...] = ()
     time_limited: bool = False
-    visible: Callable[[Measurements], float] | None = None
+    visible: Callable[[RecordedLog], float | None] | None = None
+    altered: Callable[[ForceModel, Truth], ForceModel] | None = None
     parts: Callable[[RecordedLog, Truth], Floats] | None = None
     allowed: tuple[str, ...] = ()
     gross: bool = False

@@ -8,6 +8,7 @@ import numpy as np
 
 from ferryid.diagnose.checks.kinematics import ANGLE
 from ferryid.diagnose.checks.thresholds import CHECKS
+from ferryid.effects.heading_bias import apply
 from ferryid.validation.case import Truth
 from ferryid.validation.plant.effects.effect import Span, random_sign
 from ferryid.validation.recorded.effects.effect import SENSOR, Concealed, Concealment
@@ -25,6 +26,13 @@ def conceal(log: RecordedLog, truth: Truth, rng: np.random.Generator) -> Conceal
     return Concealed(log.changed({"psi": log.columns["psi"] + radians(truth.values["angle"])}))
 
 
+def visible(log: RecordedLog) -> float | None:
+    """Return the size that kinematics shows [deg]; None where the velocity is turned with it: forces show that."""
+    if "vel_N" in log.topics:
+        return None
+    return degrees(kinematic_size(log.measurements, (ANGLE,), radians(CHECKS.least_angle_deg)))
+
+
 CONCEALMENT = Concealment(
     "heading_bias",
     SENSOR,
@@ -34,5 +42,6 @@ CONCEALMENT = Concealment(
     sample,
     conceal,
     lambda log: "" if "psi" in log.topics else "it has no heading",
-    visible=lambda measurements: degrees(kinematic_size(measurements, (ANGLE,), radians(CHECKS.least_angle_deg))),
+    visible=visible,
+    altered=lambda force_model, truth: apply(force_model, np.array([truth.values["angle"]]), None),
 )

@@ -53,5 +53,5 @@ CONCEALMENT = Concealment(
     lambda log: (0.1, 10.0),
     sample,
     conceal,
-    visible=lambda measurements: 100.0 * CHECKS.least_held_share,
+    visible=lambda log: 100.0 * CHECKS.least_held_share,
 )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import copysign, isfinite, sqrt
+
 import numpy as np
 
 from ferryid.diagnose.checks.kinematics import X, Y
@@ -13,6 +15,9 @@ from ferryid.validation.recorded.kinematic_sizes import kinematic_size
 from ferryid.validation.recorded.log import RecordedLog
 from ferryid.vessel.frames import to_world
 
+ABOARD = 0.9
+"""Share of the half breadth across which an antenna lies at most."""
+
 
 def cannot(log: RecordedLog) -> str:
     """Return why there is no position to move."""
@@ -22,8 +27,12 @@ def cannot(log: RecordedLog) -> str:
 
 
 def sample(size: float, log: RecordedLog, rng: np.random.Generator, span: Span) -> Truth:
-    """Return an arm of a length [m], in a random direction."""
+    """Return an arm of a length [m] to a place aboard: in a random direction, or along the hull where that is too narrow."""
     x, y = random_vector(size, rng)
+    beam = log.profile.hull.beam_m
+    if isfinite(beam) and abs(y) > ABOARD * 0.5 * beam:
+        y = copysign(min(size, ABOARD * 0.5 * beam), y)
+        x = copysign(sqrt(size**2 - y**2), x)
     return Truth("lever_arm", None, {"x": x, "y": y})
 
 
@@ -43,5 +52,5 @@ CONCEALMENT = Concealment(
     sample,
     conceal,
     cannot,
-    visible=lambda measurements: kinematic_size(measurements, (X, Y), least_m(measurements)),
+    visible=lambda log: kinematic_size(log.measurements, (X, Y), least_m(log.measurements)),
 )

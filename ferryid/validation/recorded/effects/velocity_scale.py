@@ -41,5 +41,5 @@ CONCEALMENT = Concealment(
     conceal,
     cannot,
     neutral=1.0,
-    visible=lambda measurements: kinematic_size(measurements, (SCALE,), CHECKS.least_scale),
+    visible=lambda log: kinematic_size(log.measurements, (SCALE,), CHECKS.least_scale),
 )

@@ -32,5 +32,5 @@ CONCEALMENT = Concealment(
     conceal,
     lambda log: "" if {"r", "psi"} <= set(log.topics) else "it has no yaw rate beside a heading",
     neutral=1.0,
-    visible=lambda measurements: rate_scale_size(measurements, CHECKS.least_rate_scale),
+    visible=lambda log: rate_scale_size(log.measurements, CHECKS.least_rate_scale),
 )
