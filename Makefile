@@ -91,7 +91,7 @@ thesis: $(VENV)/installed
 # the stored results of proof-real the page reports/proof.md. SEED=N draws other cases, RUNS=N more of them. It goes on where it
 # was interrupted. The draw by default is one for twenty minutes on two cores, of two sizes of each effect; RUNS=1 has all five,
 # RUNS=10 takes a night.
-SEED ?= 20261127
+SEED ?= 20261128
 SINGLE_LOGS = clean,single,span,vessel,pair,triple,weather,crossings,short,wrong base,outside
 proof: RUNS ?= 0.5
 proof: $(VENV)/installed

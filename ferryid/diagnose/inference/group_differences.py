@@ -66,6 +66,8 @@ class Comparison:
         Its parameters in their units, and their standard deviations with the scatter between logs, shape (p,).
     evidence
         Logarithm of the evidence over that of no such difference, both averaged over the scatter between logs [nat].
+    over_alike
+        The same over logs that are alike, without scatter: differences are compared by it, as each has a scatter of its own.
     scatter
         Standard deviation between logs, in sizes, averaged over.
     smallest
@@ -76,6 +78,7 @@ class Comparison:
     values: Floats
     errors: Floats
     evidence: float
+    over_alike: float
     scatter: float
     smallest: Floats
 
@@ -172,13 +175,17 @@ def select_differences(
         for one in order:
             if one.evidence > 0.0:
                 fit = _estimated(made, one.candidate)
-                tried.append((compare_estimated(fit, one.candidate, made).evidence, one.candidate, fit))
-        tried.sort(key=lambda one: -one[0])
-        if not tried or tried[0][0] < INFERENCE.prior_odds:
+                tried.append((compare_estimated(fit, one.candidate, made), fit))
+        tried.sort(key=lambda pair: -pair[0].over_alike)
+        likely = [(one, fit) for one, fit in tried if one.evidence >= INFERENCE.prior_odds]
+        if not likely:
             break
-        contenders[tried[0][1]] = tuple(Contender(one, gain - tried[0][0]) for gain, one, _ in tried[1:])
+        best, fit = likely[0]
+        contenders[best.candidate] = tuple(
+            Contender(one.candidate, one.over_alike - best.over_alike) for one, _ in tried if one is not best
+        )
         # With what it explains gone, the noise is less.
-        made = estimate_campaign(tried[0][2].campaign, begin=tried[0][2])
+        made = estimate_campaign(fit.campaign, begin=fit)
     for earlier in made.campaign.properties:
         # A later one may explain what an earlier one stood in for.
         if len(made.campaign.properties) > 1:
@@ -208,7 +215,8 @@ def compare_near(made: CampaignFit, candidate: Candidate) -> Comparison:
     with_it, without = _averaged(made, grams, p, True), _averaged(made, grams, p, False)
     neutral = np.array([one.neutral for one in candidate.parameters])
     evidence = with_it.evidence - without.evidence - candidate.log_alternatives
-    return _comparison(made, candidate, neutral, with_it, evidence)
+    over_alike = with_it.evidence - without.steady - candidate.log_alternatives
+    return _comparison(made, candidate, neutral, with_it, evidence, over_alike)
 
 
 def compare_estimated(made: CampaignFit, candidate: Candidate, without: CampaignFit) -> Comparison:
@@ -226,12 +234,14 @@ def compare_estimated(made: CampaignFit, candidate: Candidate, without: Campaign
     beside = _averaged(without, [_gram(without, i, one) for i, one in enumerate(slopes)], p, False)
     value = campaign.values(made.common, made.own[0])[1][campaign.properties.index(candidate)]
     # How much the scatter adds is linear, what the estimates leave is not.
-    evidence = made.evidence - without.evidence
-    evidence += (with_it.evidence - with_it.steady) - (beside.evidence - beside.steady)
-    return _comparison(made, candidate, value, with_it, evidence)
+    over_alike = made.evidence - without.evidence + with_it.evidence - with_it.steady
+    evidence = over_alike - (beside.evidence - beside.steady)
+    return _comparison(made, candidate, value, with_it, evidence, over_alike)
 
 
-def _comparison(made: CampaignFit, candidate: Candidate, at: Floats, found: _Averaged, evidence: float) -> Comparison:
+def _comparison(
+    made: CampaignFit, candidate: Candidate, at: Floats, found: _Averaged, evidence: float, over_alike: float
+) -> Comparison:
     size = np.array([one.size for one in candidate.parameters])
     away = np.abs(at + size * found.shift - [one.neutral for one in candidate.parameters])
     # One log each has no scatter to be seen: they differ as logs do.
@@ -242,7 +252,7 @@ def _comparison(made: CampaignFit, candidate: Candidate, at: Floats, found: _Ave
     least = np.sqrt((1.0 + known) * (2.0 * INFERENCE.prior_odds + np.log1p(known))) / np.maximum(known, 1e-12)
     # The evidence must favour it, and the interval exclude none.
     smallest = np.where(known > 1.0, np.maximum(size * least, 1.96 * widened), np.inf)
-    return Comparison(candidate, at + size * found.shift, errors, evidence, found.scatter, smallest)
+    return Comparison(candidate, at + size * found.shift, errors, evidence, over_alike, found.scatter, smallest)
 
 
 def scatter_shows(campaign: Campaign) -> bool:

@@ -9,10 +9,12 @@ from functools import cache
 import numpy as np
 import pytest
 
-from ferryid.diagnose.inference.campaign_estimation import estimate_campaign
+from ferryid.diagnose.inference import group_differences as inference
+from ferryid.diagnose.inference.campaign_estimation import CampaignFit, estimate_campaign
 from ferryid.diagnose.inference.campaign_model import Campaign, Member
-from ferryid.diagnose.inference.campaign_properties import properties_of
-from ferryid.diagnose.inference.group_differences import compare_near, differences_of, in_groups
+from ferryid.diagnose.inference.campaign_properties import properties_of, with_property
+from ferryid.diagnose.inference.estimation import Candidate
+from ferryid.diagnose.inference.group_differences import Comparison, compare_near, differences_of, in_groups
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.group_differences import JudgedGroups, judge_groups, smallest_note, summary
 from ferryid.effects import effects
@@ -126,3 +128,26 @@ def test_the_smallest_difference_seen_shrinks_with_more_logs() -> None:
         (weak,) = (one for one in differences_of(many) if one.key == WEAK)
         least.append(float(compare_near(made, weak).smallest[0]))
     assert least[1] < least[0]
+
+
+def test_of_differences_that_logs_scatter_in_the_likeliest_over_alike_logs_is_selected(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    made = estimate_campaign(groups((1.0, 1.0, 0.8), ("A", "A", "B")))
+    # Each has a scatter of its own, over which the second gains less, though it explains far more.
+    figures = {("payload", None): (27.0, 97.0), WEAK: (25.0, 171.0)}
+
+    def weighed(fit: CampaignFit, candidate: Candidate, _: CampaignFit | None = None) -> Comparison:
+        evidence, over_alike = figures.get(candidate.key, (-1.0, -1.0)) if candidate.group == "B" else (-1.0, -1.0)
+        nothing = np.zeros(len(candidate.parameters))
+        # Away from neutral on the side that is possible.
+        values = np.array([0.5 * (one.low + one.high) for one in candidate.parameters])
+        return Comparison(candidate, values, nothing, evidence, over_alike, 0.0, nothing)
+
+    monkeypatch.setattr(inference, "compare_near", weighed)
+    monkeypatch.setattr(inference, "compare_estimated", weighed)
+    monkeypatch.setattr(inference, "_estimated", with_property)
+    monkeypatch.setattr(inference, "INFERENCE", replace(INFERENCE, most_effects=1))
+    _, ((first, contenders),) = inference.select_differences(made, no_progress)
+    assert first.key == WEAK
+    assert [(one.candidate.key, one.behind) for one in contenders] == [(("payload", None), -74.0)]
