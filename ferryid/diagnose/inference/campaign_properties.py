@@ -68,8 +68,17 @@ class ScoredProperty:
         return self.candidate.effect.id == other.candidate.effect.id
 
 
-Rivals = Mapping[tuple[str, str | None], tuple[tuple[Candidate, float], ...]]
-"""Of each property that was selected, by its key: what was tried in its place, with the log odds over it [nat]."""
+@dataclass(frozen=True)
+class TriedProperty:
+    """What was tried in the place of a property: the log odds over it [nat], and the share of its evidence over none."""
+
+    candidate: Candidate
+    odds: float
+    share: float = 0.0
+
+
+Rivals = Mapping[tuple[str, str | None], tuple[TriedProperty, ...]]
+"""Of each property that was selected, by its key: what was tried in its place."""
 
 
 def properties_of(campaign: Campaign) -> list[Candidate]:
@@ -94,7 +103,7 @@ def properties_of(campaign: Campaign) -> list[Candidate]:
 
 def select_properties(made: CampaignFit, progress: Callable[[str], None]) -> tuple[CampaignFit, Rivals]:
     """Return the estimate with every property that the evidence speaks for, and what was tried in the place of each."""
-    rivals: dict[tuple[str, str | None], tuple[tuple[Candidate, float], ...]] = {}
+    rivals: dict[tuple[str, str | None], tuple[TriedProperty, ...]] = {}
     while len(made.campaign.properties) < INFERENCE.most_effects:
         taken = {one.key for one in made.campaign.properties}
         left = [one for one in properties_of(made.campaign) if one.key not in taken]
@@ -111,7 +120,9 @@ def select_properties(made: CampaignFit, progress: Callable[[str], None]) -> tup
         for one in found[1:]:
             if one.same_effect(best) and one.over(best) > 0.0:
                 best = one
-        rivals[best.candidate.key] = tuple((one.candidate, one.over(best)) for one in found if one is not best)
+        rivals[best.candidate.key] = tuple(
+            TriedProperty(one.candidate, one.over(best), one.gain / best.gain) for one in found if one is not best
+        )
         # With what it explains gone, the noise is less; the spreads follow.
         made = estimate_campaign(best.fit.campaign, begin=best.fit)
     return made, rivals

@@ -124,7 +124,7 @@ def judge_campaign(campaign: Campaign, place: Mapping[str, int], progress: Calla
         # What the evidence does not speak for beside the conditions is no hint either, and acts no longer.
         gone = {one.key for one in confirmed} - {one.key for one in held}
         properties = tuple(
-            replace(again[one.candidate.key], rivals=one.rivals) if one.candidate.key in again else one
+            replace(again[one.candidate.key], rivals=one.rivals, alike=one.alike) if one.candidate.key in again else one
             for one in properties
             if one.candidate.key not in gone
         )

@@ -12,13 +12,14 @@ from ferryid.counts import counted
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit
 from ferryid.diagnose.inference.campaign_model import Campaign
-from ferryid.diagnose.inference.campaign_properties import select_properties, without_property
+from ferryid.diagnose.inference.campaign_properties import TriedProperty, select_properties, without_property
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.force_errors import mass_of
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.campaign_evidence import Gain, held_out_loss
 from ferryid.diagnose.judging.credibility import felt, unfelt, value_doubt
+from ferryid.diagnose.judging.experiment_design import manoeuvre
 from ferryid.diagnose.judging.finding import Finding, Rival
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.types import AXES, Floats
@@ -44,6 +45,8 @@ class PropertyTest:
         Share of the held-out squared force error of all logs that it removes, shape (3,).
     rivals
         What was tried in its place, with the evidence over it [nat], below zero.
+    alike
+        Ids of other shapes of the same thrust curve that explain nearly as much: formulas of shapes are idealised.
     credibility
         Why it cannot be true of the vessel, or would not be felt, as the end of a sentence; empty where neither is so.
     """
@@ -55,6 +58,7 @@ class PropertyTest:
     holding: tuple[int, int]
     improvement: Floats
     rivals: tuple[Rival, ...]
+    alike: tuple[str, ...] = ()
     credibility: str = ""
 
     @property
@@ -98,7 +102,8 @@ class PropertyTest:
         away = min(max(self.evidence - INFERENCE.prior_odds, -700.0), 700.0)
         probability = 1.0 / (1.0 + exp(-away))
         t = windows.measurements.t
-        near = [one for one in self.rivals if one.delta_score > -JUDGING.unresolved_evidence]
+        near = [one.effect for one in self.rivals if one.delta_score > -JUDGING.unresolved_evidence]
+        unresolved = tuple(dict.fromkeys([*near, *self.alike]))
         return Finding(
             effect=effect.id,
             instance=self.candidate.instance,
@@ -109,7 +114,8 @@ class PropertyTest:
             improvement=dict(zip(AXES, self.improvement.tolist(), strict=True)),
             held_out=True,
             rivals=self.rivals,
-            unresolved_with=tuple(dict.fromkeys(one.effect for one in near)),
+            unresolved_with=unresolved,
+            separating_manoeuvre=manoeuvre(effect.id, unresolved, windows.measurements.profile.setting),
             says=says,
             evidence={"t": windows.middle_s},
         )
@@ -121,8 +127,8 @@ def judge_properties(made: CampaignFit, progress: Callable[[str], None]) -> tupl
     return tuple(tested(found, one, rivals.get(one.key, ())) for one in found.campaign.properties)
 
 
-def tested(made: CampaignFit, candidate: Candidate, rivals: Sequence[tuple[Candidate, float]]) -> PropertyTest:
-    """Return what speaks for one of the properties of an estimate; rivals are given with their log odds over it."""
+def tested(made: CampaignFit, candidate: Candidate, rivals: Sequence[TriedProperty]) -> PropertyTest:
+    """Return what speaks for one of the properties of an estimate, beside what was tried in its place."""
     without = without_property(made, candidate)
     before, after = held_out_loss(without), held_out_loss(made)
     gains = after.gain(before)
@@ -144,11 +150,8 @@ def tested(made: CampaignFit, candidate: Candidate, rivals: Sequence[tuple[Candi
         if one.name not in unreported
     ]
     evidence = made.evidence - without.evidence
-    others = tuple(
-        Rival(one.effect.id, one.instance, min(odds, 0.0))
-        for one, odds in sorted(rivals, key=lambda one: -one[1])
-        if one.key not in {each.key for each in made.campaign.properties}
-    )
+    others = [one for one in rivals if one.candidate.key not in {each.key for each in made.campaign.properties}]
+    others.sort(key=lambda one: -one.odds)
     return PropertyTest(
         candidate,
         {one.name: Estimate.normal(at, e, one.unit) for one, at, e in reported},
@@ -156,9 +159,17 @@ def tested(made: CampaignFit, candidate: Candidate, rivals: Sequence[tuple[Candi
         Gain.of(gains),
         (sum(one > 0.0 for one in by_log), len(by_log)),
         np.asarray(1.0 - squares[1] / np.where(squares[0] > 0.0, squares[0], np.inf)),
-        others,
+        tuple(Rival(one.candidate.effect.id, one.candidate.instance, min(one.odds, 0.0)) for one in others),
+        tuple(one.candidate.effect.id for one in others if _same_curve(one, candidate)),
         _credibility(made, candidate, {one.name: at for one, at, _ in reported}),
     )
+
+
+def _same_curve(one: TriedProperty, candidate: Candidate) -> bool:
+    """Tell whether it is another shape of the same actuator's thrust curve that explains nearly as much."""
+    shapes = one.candidate.effect.of_thrust_curve and candidate.effect.of_thrust_curve
+    same = one.candidate.instance == candidate.instance
+    return shapes and same and one.share >= JUDGING.alike_shapes
 
 
 def _credibility(made: CampaignFit, candidate: Candidate, values: Mapping[str, float]) -> str:

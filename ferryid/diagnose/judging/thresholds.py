@@ -20,6 +20,12 @@ class JudgingThresholds:
         "rivals whose log evidence is less than this behind are unresolved",
         "convention: a Bayes factor of 20, strong evidence in the scale of Kass and Raftery (1995)",
     )
+    alike_shapes: float = threshold(
+        0.9,
+        "of the evidence over none",
+        "what another shape of the same thrust curve must explain to be unresolved, too",
+        "tuned on validation runs at sea: a limit and an idealised loss by air, each taken for the other at 0.91 and 0.93",
+    )
     fitted_rivals: int = threshold(
         4,
         "rivals",

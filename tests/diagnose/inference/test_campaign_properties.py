@@ -15,6 +15,7 @@ from ferryid.diagnose.inference.campaign_model import Campaign, Member
 from ferryid.diagnose.inference.campaign_properties import (
     ScoredProperty,
     Start,
+    TriedProperty,
     properties_of,
     select_properties,
     start_of,
@@ -24,7 +25,6 @@ from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging import campaign as judging
 from ferryid.diagnose.judging.campaign import judge_campaign
-from ferryid.diagnose.judging.campaign_properties import tested
 from ferryid.effects import effects
 from ferryid.effects.actuator_force import force_limits
 from ferryid.types import no_progress
@@ -136,8 +136,8 @@ def test_what_was_tried_in_a_propertys_place_is_compared_in_its_own_round(monkey
     monkeypatch.setattr(selection, "properties_of", left)
     _, rivals = select_properties(made, no_progress)
     assert list(rivals) == [("thruster_gain", "thruster1")]
-    (first, *_) = sorted(rivals["thruster_gain", "thruster1"], key=lambda one: -one[1])
-    assert (first[0].key, first[1]) == (("thruster_lag", None), -2.0)
+    (first, *_) = sorted(rivals["thruster_gain", "thruster1"], key=lambda one: -one.odds)
+    assert (first.candidate.key, first.odds, first.share) == (("thruster_lag", None), -2.0, pytest.approx(0.96))
 
 
 def test_a_guessed_hulls_volume_does_not_decide_between_two_thrusters() -> None:
@@ -168,7 +168,7 @@ def test_a_factor_on_the_only_actuator_is_one_on_a_guessed_hull() -> None:
             for one in made.campaign.members
         )
         campaign = replace(made.campaign, members=members, hull=replace(made.campaign.hull, known=known))
-        return tested(replace(made, campaign=campaign), gain, ()).doubt
+        return judging.tested(replace(made, campaign=campaign), gain, ()).doubt
 
     assert "hull model" in doubt(known=False, actuators=1)
     assert "hull model" not in doubt(known=True, actuators=1)
@@ -211,7 +211,23 @@ def test_a_limit_of_a_thrusters_force_is_found_from_where_forces_depend_on_it(sh
     assert [one.key for one in found.campaign.properties] == [("thrust_saturation", "thruster1")]
     assert limit == pytest.approx(share * end, rel=0.03)
     # What only takes off a share of a large force is not as good.
-    assert all(odds < -5.0 for _, odds in rivals["thrust_saturation", "thruster1"])
+    assert all(one.odds < -5.0 for one in rivals["thrust_saturation", "thruster1"])
+
+
+def test_shapes_of_a_thrust_curve_that_explain_nearly_as_much_are_unresolved() -> None:
+    made, _ = select_properties(estimate_campaign(limited(0.6 * force_limits(FERRY.actuators[0])[0])), no_progress)
+    (found,) = made.campaign.properties
+    windows = made.campaign.members[0].windows
+
+    def unresolved(effect: str, instance: str | None, share: float) -> tuple[str, ...]:
+        other = Candidate.of(effects()[effect], instance, FERRY)
+        return judging.tested(made, found, [TriedProperty(other, -50.0, share)]).finding(windows).unresolved_with
+
+    assert unresolved("ventilation", "thruster1", 0.91) == ("ventilation",)
+    assert unresolved("ventilation", "thruster1", 0.89) == ()
+    assert unresolved("ventilation", "thruster2", 0.99) == ()
+    # A factor is no shape of the curve.
+    assert unresolved("thruster_gain", "thruster1", 0.99) == ()
 
 
 def test_what_a_start_promises_is_what_the_estimate_keeps() -> None:
