@@ -70,7 +70,7 @@ class ScoredProperty:
 
 @dataclass(frozen=True)
 class TriedProperty:
-    """What was tried in the place of a property: the log odds over it [nat], and the share of its evidence over none."""
+    """What was tried in the place of a property: the log odds over it [nat], and its share of the most evidence over none."""
 
     candidate: Candidate
     odds: float
@@ -121,7 +121,7 @@ def select_properties(made: CampaignFit, progress: Callable[[str], None]) -> tup
             if one.same_effect(best) and one.over(best) > 0.0:
                 best = one
         rivals[best.candidate.key] = tuple(
-            TriedProperty(one.candidate, one.over(best), one.gain / best.gain) for one in found if one is not best
+            TriedProperty(one.candidate, one.over(best), one.gain / found[0].gain) for one in found if one is not best
         )
         # With what it explains gone, the noise is less; the spreads follow.
         made = estimate_campaign(best.fit.campaign, begin=best.fit)
