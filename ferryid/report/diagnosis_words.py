@@ -220,7 +220,21 @@ def rivals(finding: Finding) -> list[str]:
     if finding.unresolved_with:
         names = listed([_inline(one) for name in finding.unresolved_with for one in _meant(finding, name)], "or")
         lines.append(f"This log cannot distinguish it from {names}.")
-    shown = sorted(finding.rivals, key=lambda rival: -rival.delta_score)[:RIVALS]
+    # Another shape of the same thrust curve may be unresolved though the evidence is clear.
+    alike = [
+        one
+        for one in finding.rivals
+        if one.effect in finding.unresolved_with
+        and one.delta_score <= -log(FAR)
+        and (known := effects().get(one.effect)) is not None
+        and known.of_thrust_curve
+    ]
+    if alike:
+        shapes = listed([_inline(title(one.effect, one.instance)) for one in alike])
+        lines.append(
+            f"The evidence is against {shapes}, but that explains nearly as much, and formulas of thrust are idealised."
+        )
+    shown = sorted((one for one in finding.rivals if one not in alike), key=lambda rival: -rival.delta_score)[:RIVALS]
     near = [one for one in shown if one.delta_score > -log(FAR)]
     far = [_inline(title(one.effect, one.instance)) for one in shown if one not in near]
     if near:

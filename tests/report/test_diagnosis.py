@@ -292,6 +292,18 @@ def test_rivals_are_told_by_how_much_less_likely_they_are() -> None:
     )
 
 
+def test_another_shape_of_the_thrust_curve_is_unresolved_though_the_evidence_is_clear() -> None:
+    others = (Rival("ventilation", "fore", -37.0), Rival("thrust_inflow_loss", None, -300.0))
+    limit = replace(
+        gain(), effect="thrust_saturation", instance="fore", unresolved_with=("ventilation",), rivals=others
+    )
+    told = rivals(limit)
+    assert told[0] == "This log cannot distinguish it from ventilation."
+    assert told[1].startswith("The evidence is against ventilation (fore), but that explains nearly as much")
+    assert told[2].endswith("less likely by a factor of more than a million: inflow loss would be next.")
+    assert "against" not in " ".join(rivals(replace(limit, unresolved_with=())))
+
+
 def test_where_is_told_by_what_is_known_of_it() -> None:
     some = replace(wind(), intervals=((100.0, 180.0), (400.0, 460.0)), regime="all along", axes={"yaw": 1.0})
     assert where(some) == "It acts from 100 to 180 s and 400 to 460 s, and shows in yaw (100 %)."
