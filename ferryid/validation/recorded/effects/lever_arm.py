@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import copysign, isfinite, sqrt
+from math import copysign, sqrt
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from ferryid.validation.plant.effects.effect import Span, random_vector
 from ferryid.validation.recorded.effects.effect import SENSOR, Concealed, Concealment, length_of
 from ferryid.validation.recorded.kinematic_sizes import kinematic_size
 from ferryid.validation.recorded.log import RecordedLog
+from ferryid.vessel.dimensions import dimensions
 from ferryid.vessel.frames import to_world
 
 ABOARD = 0.9
@@ -29,9 +30,9 @@ def cannot(log: RecordedLog) -> str:
 def sample(size: float, log: RecordedLog, rng: np.random.Generator, span: Span) -> Truth:
     """Return an arm of a length [m] to a place aboard: in a random direction, or along the hull where that is too narrow."""
     x, y = random_vector(size, rng)
-    beam = log.profile.hull.beam_m
-    if isfinite(beam) and abs(y) > ABOARD * 0.5 * beam:
-        y = copysign(min(size, ABOARD * 0.5 * beam), y)
+    across = ABOARD * 0.5 * dimensions(log.profile)[1]
+    if abs(y) > across:
+        y = copysign(across, y)
         x = copysign(sqrt(size**2 - y**2), x)
     return Truth("lever_arm", None, {"x": x, "y": y})
 
