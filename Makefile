@@ -18,11 +18,12 @@ quick: $(VENV)/installed
 	$(BIN)/ruff check .
 	$(BIN)/pytest $(SPREAD) -q -m "not slow"
 
-# Everything. The types are checked beside the first tests.
+# Everything. The types are checked beside the first tests. DURATIONS=0 lists the time of every test, not of the slowest alone.
+test: DURATIONS ?= 25
 test: $(VENV)/installed
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy & $(BIN)/pytest $(SPREAD) --durations=25; code=$$?; wait $$! && exit $$code
+	$(BIN)/mypy & $(BIN)/pytest $(SPREAD) --durations=$(DURATIONS); code=$$?; wait $$! && exit $$code
 
 # The documents as a site, in build/site, with the pages that are made from the code; a broken link is an error.
 docs: $(VENV)/installed
