@@ -225,6 +225,7 @@ def rivals(finding: Finding) -> list[str]:
         one
         for one in finding.rivals
         if one.effect in finding.unresolved_with
+        and one.instance == finding.instance
         and one.delta_score <= -log(FAR)
         and (known := effects().get(one.effect)) is not None
         and known.of_thrust_curve

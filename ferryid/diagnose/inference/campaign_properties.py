@@ -30,9 +30,9 @@ from ferryid.vessel.profile import Profile
 INSTRUMENTS = frozenset({"time_delay"})
 """What is no property of hull or actuators, and yet the same in all logs of a vessel."""
 WEIGHED, WORTH = 5, 0.25
-"""Most candidates that are estimated in a round, the best by their scores, and the least of the best score that one has."""
-STARTS = (1.0, 0.75, 0.5, 0.25)
-"""Shares of the way to its start at which a property with a limit is weighed: only beyond the limit do forces depend on it."""
+"""Most candidates that are estimated in a round, and the share of the most evidence so far that a further one must promise."""
+START_SHARES = (1.0, 0.75, 0.5, 0.25)
+"""Shares of the way from neutral to its start at which a property with the end of a range is weighed, as its slope is local."""
 
 
 @dataclass(frozen=True)
@@ -111,15 +111,18 @@ def select_properties(made: CampaignFit, progress: Callable[[str], None]) -> tup
         made = estimate_campaign(made.campaign, noise=made.noise, begin=made)
         progress(f"weighing {len(left)} lasting properties over all logs")
         starts = sorted(over(partial(start_of, made), left), key=lambda one: -one.gain)
-        least = max(WORTH * starts[0].gain, 0.0) if starts else 0.0
-        found = [_estimated(made, one) for one in starts[:WEIGHED] if one.gain > least]
+        found: list[ScoredProperty] = []
+        for one in starts[:WEIGHED]:
+            # A promise may be of what is impossible: what was estimated decides how much the others must promise.
+            if one.gain > max([0.0, *(WORTH * other.gain for other in found)]):
+                found.append(_estimated(made, one))
         found.sort(key=lambda one: -one.gain)
         if not found or found[0].gain < INFERENCE.prior_odds:
             break
         best = found[0]
-        for one in found[1:]:
-            if one.same_effect(best) and one.over(best) > 0.0:
-                best = one
+        for other in found[1:]:
+            if other.same_effect(best) and other.over(best) > 0.0:
+                best = other
         rivals[best.candidate.key] = tuple(
             TriedProperty(one.candidate, one.over(best), one.gain / found[0].gain) for one in found if one is not best
         )
@@ -130,14 +133,16 @@ def select_properties(made: CampaignFit, progress: Callable[[str], None]) -> tup
 
 def start_of(made: CampaignFit, candidate: Candidate) -> Start:
     """Return where a search for a property begins: of its starts, the one from which the gaps promise the most evidence."""
-    starts = (_linearised(made, candidate, share) for share in (STARTS if candidate.effect.piecewise else (1.0,)))
+    starts = (_linearised(made, candidate, share) for share in (START_SHARES if candidate.effect.piecewise else (1.0,)))
     return max(starts, key=lambda one: one.gain)
 
 
 def _linearised(made: CampaignFit, candidate: Candidate, share: float) -> Start:
     """Return the evidence that a property would add if the gaps were linear from some share of its start on.
 
-    Gaps and slopes are taken where the search begins: what a limit does to larger forces is no slope of what it leaves of them.
+    Where a limit does not act yet, forces do not depend on it, so that gaps and slopes are taken where the search begins; those
+    of the hull and of the logs' own vectors are the estimate's. Gained is what the squares of the gaps and of the prior fall by
+    from the estimate, with all of these eliminated, less the logarithm of what is determined of the property.
     """
     begun = with_property(made, candidate, share)
     g, q, normal = made.campaign.g, len(candidate.parameters), made.normal
@@ -169,6 +174,7 @@ def _linearised(made: CampaignFit, candidate: Candidate, share: float) -> Start:
     r -= follow.T @ common
     gained += 0.5 * float(common @ np.linalg.solve(A, common) - before @ np.linalg.solve(A, before))
     gained += 0.5 * float(r @ np.linalg.solve(M, r)) - 0.5 * float(np.linalg.slogdet(M)[1])
+    gained -= candidate.log_alternatives
     return Start(candidate, begun, gained)
 
 
@@ -176,11 +182,11 @@ def with_property(made: CampaignFit, candidate: Candidate, share: float = 1.0) -
     """Return an estimate with a property more: at a share of the way from where it does not act to its start."""
     campaign = replace(made.campaign, properties=(*made.campaign.properties, candidate))
     place = made.campaign.g - len(made.campaign.own)
-    none = [
+    start = [
         share * ((one.neutral if one.start is None else one.start) - one.neutral) / one.size
         for one in candidate.parameters
     ]
-    return replace(made, campaign=campaign, common=np.insert(made.common, place, none))
+    return replace(made, campaign=campaign, common=np.insert(made.common, place, start))
 
 
 def without_property(made: CampaignFit, candidate: Candidate) -> CampaignFit:

@@ -67,7 +67,7 @@ class Comparison:
     evidence
         Logarithm of the evidence over that of no such difference, both averaged over the scatter between logs [nat].
     over_alike
-        The same over logs that are alike, without scatter: differences are compared by it, as each has a scatter of its own.
+        The same without scatter: what differences are compared by, as the scatter of each is another.
     scatter
         Standard deviation between logs, in sizes, averaged over.
     smallest
@@ -182,7 +182,9 @@ def select_differences(
             break
         best, fit = likely[0]
         contenders[best.candidate] = tuple(
-            Contender(one.candidate, one.over_alike - best.over_alike) for one, _ in tried if one is not best
+            Contender(one.candidate, one.over_alike - best.over_alike)
+            for one, _ in tried
+            if one is not best and one.over_alike <= best.over_alike
         )
         # With what it explains gone, the noise is less.
         made = estimate_campaign(fit.campaign, begin=fit)
@@ -215,7 +217,7 @@ def compare_near(made: CampaignFit, candidate: Candidate) -> Comparison:
     with_it, without = _averaged(made, grams, p, True), _averaged(made, grams, p, False)
     neutral = np.array([one.neutral for one in candidate.parameters])
     evidence = with_it.evidence - without.evidence - candidate.log_alternatives
-    over_alike = with_it.evidence - without.steady - candidate.log_alternatives
+    over_alike = with_it.steady - without.steady - candidate.log_alternatives
     return _comparison(made, candidate, neutral, with_it, evidence, over_alike)
 
 
@@ -234,8 +236,8 @@ def compare_estimated(made: CampaignFit, candidate: Candidate, without: Campaign
     beside = _averaged(without, [_gram(without, i, one) for i, one in enumerate(slopes)], p, False)
     value = campaign.values(made.common, made.own[0])[1][campaign.properties.index(candidate)]
     # How much the scatter adds is linear, what the estimates leave is not.
-    over_alike = made.evidence - without.evidence + with_it.evidence - with_it.steady
-    evidence = over_alike - (beside.evidence - beside.steady)
+    over_alike = made.evidence - without.evidence
+    evidence = over_alike + (with_it.evidence - with_it.steady) - (beside.evidence - beside.steady)
     return _comparison(made, candidate, value, with_it, evidence, over_alike)
 
 

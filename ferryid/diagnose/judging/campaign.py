@@ -21,6 +21,7 @@ from ferryid.diagnose.judging.claims import Claim, Figures
 from ferryid.diagnose.judging.credibility import campaign_hull
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.posterior import HullPosterior
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.force_model import COEFFICIENTS, ForceModel
 
 
@@ -68,9 +69,16 @@ class JudgedCampaign:
 
     @cached_property
     def weighed(self) -> frozenset[tuple[str, str | None]]:
-        """Lasting properties that the logs were weighed for together, and do not confirm."""
+        """Lasting properties that most logs can show, were weighed for together, and do not confirm."""
         campaign = self.hull.fit.campaign
-        return frozenset(one.key for one in properties_of(campaign)) - {one.key for one in campaign.properties}
+        logs = [one.windows.measurements for one in campaign.members]
+
+        def most(one: Candidate) -> bool:
+            able = sum(not one.effect.cannot_be_of(measurements, one.instance) for measurements in logs)
+            return able > JUDGING.campaign_share * len(logs)
+
+        confirmed = {one.key for one in campaign.properties}
+        return frozenset(one.key for one in properties_of(campaign) if one.key not in confirmed and most(one))
 
     @property
     def notes(self) -> tuple[str, ...]:

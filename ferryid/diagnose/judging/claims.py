@@ -100,7 +100,7 @@ class LogFigures:
     campaign
         Lasting properties of the vessel that each log of the campaign shows, this log's among them.
     weighed
-        Lasting properties that all logs of the campaign were weighed for together, and do not confirm.
+        Lasting properties that most logs of the campaign can show, were weighed for together, and do not confirm.
     baseline_sensors
         Sensor errors that the simulation has which the log is compared with: parameters by effect.
     setting

@@ -338,9 +338,9 @@ def absent_in_other_logs(finding: Finding, context: Context, threshold: float) -
 
 @rule()
 def not_of_all_logs(finding: Finding, context: Context, _threshold: float) -> Outcome:
-    """Lower a lasting property that one log shows, where all logs together were weighed for it and do not confirm it.
+    """Lower a lasting property that single logs show, where all logs together were weighed for it and do not confirm it.
 
-    A hull that is known from these logs only may be off in the manoeuvres of one of them; what sets in is a log's own.
+    A hull that is known from these logs only may be off in the manoeuvres of some of them; what sets in is a log's own.
     """
     log = context.log
     weighed = context.own.kind == "force" and lasting(finding) and finding.key in log.weighed

@@ -121,7 +121,7 @@ def test_what_was_tried_in_a_propertys_place_is_compared_in_its_own_round(monkey
     made = estimate_campaign(weakened(0.8))
     gains = iter([{("thruster_gain", "thruster1"): 50.0, ("thruster_lag", None): 48.0}, {}])
     monkeypatch.setattr(selection, "WEIGHED", 99)
-    monkeypatch.setattr(selection, "start_of", lambda made, one: Start(one, with_property(made, one), 1.0))
+    monkeypatch.setattr(selection, "start_of", lambda made, one: Start(one, with_property(made, one), 99.0))
 
     def estimated(made: CampaignFit, start: Start) -> ScoredProperty:
         return ScoredProperty(start.candidate, start.begun, gain.get(start.candidate.key, 0.0))
@@ -138,6 +138,25 @@ def test_what_was_tried_in_a_propertys_place_is_compared_in_its_own_round(monkey
     assert list(rivals) == [("thruster_gain", "thruster1")]
     (first, *_) = sorted(rivals["thruster_gain", "thruster1"], key=lambda one: -one.odds)
     assert (first.candidate.key, first.odds, first.share) == (("thruster_lag", None), -2.0, pytest.approx(0.96))
+
+
+def test_a_promise_of_what_is_impossible_hides_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = estimate_campaign(weakened(0.8))
+    # A lag below zero would explain much, and is none.
+    promised = {("thruster_lag", None): 200.0, ("thruster_gain", "thruster1"): 45.0}
+    kept = {("thruster_gain", "thruster1"): 45.0}
+
+    def start(made: CampaignFit, one: Candidate) -> Start:
+        taken = made.campaign.properties
+        return Start(one, with_property(made, one), -1.0 if taken else promised.get(one.key, -1.0))
+
+    def estimated(made: CampaignFit, start: Start) -> ScoredProperty:
+        return ScoredProperty(start.candidate, start.begun, kept.get(start.candidate.key, 0.0))
+
+    monkeypatch.setattr(selection, "start_of", start)
+    monkeypatch.setattr(selection, "_estimated", estimated)
+    found, _ = select_properties(made, no_progress)
+    assert [one.key for one in found.campaign.properties] == [("thruster_gain", "thruster1")]
 
 
 def test_a_guessed_hulls_volume_does_not_decide_between_two_thrusters() -> None:

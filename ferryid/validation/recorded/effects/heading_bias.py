@@ -28,7 +28,7 @@ def conceal(log: RecordedLog, truth: Truth, rng: np.random.Generator) -> Conceal
 
 def visible(log: RecordedLog) -> float | None:
     """Return the size that kinematics shows [deg]; None where the velocity is turned with it: forces show that."""
-    if "vel_N" in log.topics:
+    if "u" not in log.topics:
         return None
     return degrees(kinematic_size(log.measurements, (ANGLE,), radians(CHECKS.least_angle_deg)))
 
