@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -24,6 +25,12 @@ def test_every_page_has_a_state_and_old_ones_are_told(record_property: Callable[
     for one in every:
         if one.changed:
             record_property("notice", str(one))
+
+
+def test_no_page_names_a_folder_of_the_machine_that_made_it() -> None:
+    folder = re.compile(rb"(?<![\w./])/(?:home|root|tmp|work|Users|var/folders)/[^\s\"]*")
+    every = [path for path in (ROOT / "reports").rglob("*") if path.is_file()]
+    assert {path.name: found for path in every if (found := folder.findall(path.read_bytes()))} == {}
 
 
 @pytest.mark.slow

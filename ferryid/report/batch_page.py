@@ -15,7 +15,15 @@ from urllib.parse import quote
 from ferryid.counts import counted
 from ferryid.diagnose import JUDGING
 from ferryid.report import batch_figures
-from ferryid.report.batch_rows import BatchResult, EvaluationSummary, FindingSummary, SummaryRow, Trend, by_date
+from ferryid.report.batch_rows import (
+    BatchResult,
+    EvaluationSummary,
+    FindingSummary,
+    SummaryRow,
+    Trend,
+    by_date,
+    date_text,
+)
 from ferryid.report.batch_timeline import errors_timeline, findings_timeline, row_id
 from ferryid.report.diagnosis_words import title
 from ferryid.report.html import template
@@ -202,7 +210,7 @@ def _row(row: SummaryRow, name: str) -> TableRow:
         vessel=row.vessel,
         note=row.note,
         date=(row.date or "")[:10],
-        time=_time(row),
+        time=date_text(row),
         minutes=None if row.duration_s is None else row.duration_s / 60.0,
         verdict=(diagnosis.verdict if diagnosis else "").replace("_", " "),
         found=_named(sure),
@@ -231,12 +239,6 @@ def _lost(lost: LostData | None) -> Lost:
         sentences=lost.sentences,
         seconds=lost.seconds + lost.seconds_left_out,
     )
-
-
-def _time(row: SummaryRow) -> str:
-    """Return when a log begins; of a manifest that gives the day, no more than the day."""
-    time = (row.date or "")[:16].replace("T", " ")
-    return time.removesuffix(" 00:00") if row.date_from == "manifest" else time
 
 
 def _named(findings: Sequence[FindingSummary]) -> tuple[NamedFinding, ...]:

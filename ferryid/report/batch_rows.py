@@ -194,6 +194,12 @@ class SummaryRow(Record):
         return next((one for one in self.findings if one.key == key), None)
 
 
+def date_text(row: SummaryRow) -> str:
+    """Return when a log began, without a time of day where none is known; empty where it has no date."""
+    time = (row.date or "")[:16].replace("T", " ")
+    return time.removesuffix(" 00:00") if row.date_from == "manifest" else time
+
+
 def by_date(rows: Sequence[SummaryRow]) -> tuple[list[SummaryRow], bool]:
     """Return rows in the order of their dates and True; in their own order and False where one has no date."""
     if not all(row.date for row in rows):

@@ -9,7 +9,7 @@ import numpy as np
 
 from ferryid.diagnose import JUDGING
 from ferryid.report.batch_figures import ERRORS, parameter_label
-from ferryid.report.batch_rows import SummaryRow, Trend, TrendPoint
+from ferryid.report.batch_rows import SummaryRow, Trend, TrendPoint, date_text
 from ferryid.report.figures import ROLES, UNITS
 from ferryid.report.timeline import Axis, Strip, Timeline, Trace
 from ferryid.types import AXES, Floats
@@ -86,7 +86,8 @@ def _along(rows: Sequence[SummaryRow], dated: bool, places: Mapping[int, int]) -
         date = datetime.fromisoformat(row.date or "")
         second = (date if date.tzinfo else date.replace(tzinfo=UTC)).timestamp()
         t.append(max(second, t[-1] + APART_S) if t else second)
-    return np.array(t), Axis("date", "date", names, links)
+    # Logs of one date are drawn apart, and the cursor tells that date.
+    return np.array(t), Axis("date", "date", tuple(f"{date_text(row)} {row.name}" for row in rows), links)
 
 
 def _points(label: str, points: Sequence[TrendPoint], count: int, *, hollow: bool) -> Trace:

@@ -58,9 +58,9 @@ class Interactive:
     timelines: Mapping[int, Timeline] = field(default_factory=dict)
     place: str = ""
 
-    def number(self, log: int) -> int:
-        """Return which timeline is that of a log or a figure, from 1; 0 where it has none."""
-        return list(self.timelines).index(log) + 1 if log in self.timelines else 0
+    def number(self, place: int) -> int:
+        """Return which timeline is at the place of a log or a figure, from 1; 0 where it has none."""
+        return list(self.timelines).index(place) + 1 if place in self.timelines else 0
 
     @property
     def assets(self) -> dict[str, list[str]]:

@@ -12,11 +12,13 @@ from ferryid.types import AXES, Flags
 def structures_timeline(one: StructureComparison) -> Timeline:
     """Return the error of every structure over the best one's, with its interval, a strip for each axis."""
     ratios = [structure.against_best for structure in one.structures]
-    # A logarithm is of what is positive; a structure that makes no error has none.
     value, low, high = (
-        np.array([np.where(each > 0.0, each, np.nan) for each in parts])
-        for parts in zip(*((ratio.value, ratio.low, ratio.high) for ratio in ratios), strict=True)
+        np.array(parts) for parts in zip(*((ratio.value, ratio.low, ratio.high) for ratio in ratios), strict=True)
     )
+    # A logarithm is of what is positive: an interval down to zero ends below all values, and what makes no error is not drawn.
+    least = 0.5 * np.min(np.where(value > 0.0, value, np.inf), axis=0)
+    value, high = (np.where(each > 0.0, each, np.nan) for each in (value, high))
+    low = np.where(high > 0.0, np.maximum(low, least), np.nan)
     supported = np.array([structure is one.supported for structure in one.structures])
     kept = np.array([structure.kept for structure in one.structures])
 

@@ -29,8 +29,6 @@ LARGEST = 1e150
 """What is beyond is drawn at it: the span of the values must be a number."""
 BREAK = 2.5
 """A line breaks where two rows are this many times the usual step apart."""
-
-
 PALETTE = 6
 """Colours ``c0`` to ``c5`` of the pages."""
 

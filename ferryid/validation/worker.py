@@ -62,7 +62,7 @@ def diagnose_log(log: Path, profile: Path, out: Path, more: Sequence[Path] = ())
     except UnwritableError:
         raise
     except FerryIdError as error:
-        return Diagnosis("refused", time.perf_counter() - start, error=str(error))
+        return Diagnosis("refused", time.perf_counter() - start, error=_within(profile.parent, str(error)))
     return Diagnosis.from_json(
         {name: made[name] for name in ("verdict", "notes", "before", "after")}
         | {
@@ -100,6 +100,11 @@ def _finding(one: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
+def _within(folder: Path, text: str) -> str:
+    """Return a text in which paths lead from the folder of the case: results are published, and tell of no machine."""
+    return text.replace(f"{folder}{os.sep}", "")
+
+
 def main(diagnose: Callable[..., Diagnosis] = diagnose_log) -> None:
     """Answer requests until standard input ends.
 
@@ -127,7 +132,7 @@ def main(diagnose: Callable[..., Diagnosis] = diagnose_log) -> None:
         except Exception as error:  # noqa: BLE001 - a bug that one log shows is reported in its line, and the others go on
             place = traceback.extract_tb(error.__traceback__)[-1]
             bug = one_line(f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})")
-            answer = Diagnosis("crashed", time.perf_counter() - start, error=bug).to_json()
+            answer = Diagnosis("crashed", time.perf_counter() - start, error=_within(profile.parent, bug)).to_json()
         _answer(answers, answer)
 
 

@@ -15,6 +15,7 @@ from ferryid.report.batch_page import render, timelines
 from ferryid.report.html import template
 from ferryid.report.interactive import make_interactive
 from ferryid.report.structures_timeline import structures_timeline
+from ferryid.report.timeline import Axis, Strip, Timeline, Trace
 from tests.report.browser import CHROMIUM, Page
 from tests.report.pages import NEEDS_UPLOT
 from tests.report.test_interactive import SHIFT, named
@@ -67,10 +68,10 @@ def point(page: Page, trace: int, row: int, strip: int = 0) -> tuple[float, floa
 
 
 def test_the_cursor_tells_the_log_and_its_interval(opened: Page) -> None:
-    assert opened.do(RANGE) == "2024-05-01 to 2024-05-04 00:01"
+    assert opened.do(RANGE) == "2024-05-01 to 2024-05-04"
     opened.mouse("mouseMoved", *point(opened, 1, 1))
     opened.settle()
-    assert opened.do(RANGE).endswith(" · cursor 2024-05-02 2.mcap")
+    assert opened.do(RANGE).endswith(" · cursor 2024-05-02 00:00 2.mcap")
     shown = opened.do(f"{FIRST}.strips.rows[0].outputs.map((one) => one.textContent)")
     assert shown == ["0.9 (-0.1 to 1.9)", "–", "–"]
 
@@ -114,6 +115,15 @@ def test_a_click_on_a_point_leads_to_the_row_of_its_log_even_if_filtered_out(ope
     assert not opened.do("document.querySelector('#log-1').hidden")
     top = opened.do("document.querySelector('#log-1').getBoundingClientRect().top")
     assert 0.0 <= top < 900.0
+    # Again, after it was filtered out once more.
+    opened.do("document.querySelector('#filters [name=text]').value = '2.mcap'")
+    opened.do("document.querySelector('#filters').dispatchEvent(new Event('input'))")
+    assert opened.do("document.querySelector('#log-1').hidden")
+    x, y = point(opened, 2, 2)
+    for kind in ("mousePressed", "mouseReleased"):
+        opened.mouse(kind, x, y, clickCount=1)
+    opened.settle()
+    assert not opened.do("document.querySelector('#log-1').hidden")
 
 
 def test_a_point_that_is_switched_off_leads_nowhere(opened: Page) -> None:
@@ -134,7 +144,7 @@ def test_zoom_goes_down_to_two_logs_of_one_day_and_frames_their_intervals(opened
     opened.do(f"{FIRST}.see({FIRST}.axis.t[3], {FIRST}.axis.t[3])")
     opened.settle()
     assert opened.do(f"{FIRST}.to - {FIRST}.from") == pytest.approx(120.0)
-    assert opened.do(RANGE) == "2024-05-04 to 2024-05-04 00:01"
+    assert opened.do(RANGE) == "2024-05-04 to 2024-05-04", "no time of day is made up"
     opened.click(named("show all"))
     assert opened.do(f"{FIRST}.to - {FIRST}.from") > 3.0 * 86400.0
 
@@ -165,17 +175,22 @@ def test_a_batch_is_no_wider_than_the_window(page: Page, batch: Path, width: int
     assert page.do("document.documentElement.scrollWidth") <= width
 
 
-def test_structures_stand_below_their_axis_by_name_on_a_logarithmic_one(page: Page, tmp_path: Path) -> None:
-    every = [structure(f"basis {k}", 0.5, 1.0 + 0.02 * k, 5 + k) for k in range(12)]
-    every[-1] = replace(every[-1], against_best=replace(every[-1].against_best, high=np.array([900.0, 1.0, 1.0])))
-    made = structures_timeline(StructureComparison(tuple(every), np.ones(3), 5, 100, 20))
-    interactive = make_interactive({0: made}, tmp_path / "reports" / "a", tmp_path)
+def show(page: Page, made: Timeline, out: Path) -> None:
+    """Open a page with one figure along another axis than time."""
+    interactive = make_interactive({0: made}, out / "reports" / "a", out)
     sections = [{"one": made, "timeline": 1, "svg": "<svg></svg>", "best": "x", "simplest": "x", "table": []}]
     text = template("structures.html").render(
         made={}, vessel="ferry", axes=(), sections=sections, unusable={}, settings={}, assets=interactive.assets
     )
     page.faults.clear()
-    page.open(write(tmp_path / "reports" / "a", text, interactive.files()))
+    page.open(write(out / "reports" / "a", text, interactive.files()))
+
+
+def test_structures_stand_below_their_axis_by_name_on_a_logarithmic_one(page: Page, tmp_path: Path) -> None:
+    every = [structure(f"basis {k}", 0.5, 1.0 + 0.02 * k, 5 + k) for k in range(12)]
+    every[-1] = replace(every[-1], against_best=replace(every[-1].against_best, high=np.array([900.0, 1.0, 1.0])))
+    made = structures_timeline(StructureComparison(tuple(every), np.ones(3), 5, 100, 20))
+    show(page, made, tmp_path)
     plot = f"{FIRST}.strips.rows[0].plot"
     assert page.do(f"{plot}.scales.y.max") == pytest.approx(900.0 * 1.05)
     ticks = page.do(f"{plot}.axes[1]._splits")
@@ -193,4 +208,23 @@ def test_structures_stand_below_their_axis_by_name_on_a_logarithmic_one(page: Pa
     page.mouse("mouseMoved", *point(page, 2, 1))
     page.settle()
     assert page.do(RANGE) == "1 to 3 of 12 · cursor basis 1, coupled"
+    assert page.faults == []
+
+
+def test_an_interval_beyond_the_frame_ends_in_an_arrow_at_its_edge(page: Page, tmp_path: Path) -> None:
+    trace = Trace(
+        "differs", np.array([0.5, 2.0]), "new", style="points", low=np.array([0.0, 1.0]), high=np.array([1.0, 50.0])
+    )
+    strip = Strip("difference", (trace,), frame=(-3.0, 3.0))
+    made = Timeline("differences", np.array([1.0, 2.0]), (strip,), axis=Axis("property", "name", ("a", "b")))
+    show(page, made, tmp_path)
+    page.middle(".u-over")
+    assert page.do(f"{FIRST}.strips.rows[0].plot.scales.y.max") == 3.0
+    # Beside the bars, pixels just below the upper edge: an arrow is there, and none at the row that is within the frame.
+    inked = page.do(f"""(() => {{
+        const plot = {FIRST}.strips.rows[0].plot, ratio = uPlot.pxRatio;
+        const line = plot.ctx.getImageData(0, plot.bbox.top + 4 * ratio, plot.ctx.canvas.width, 1).data;
+        return [1, 2].map((row) => line[4 * Math.round(plot.valToPos(row, "x", true) + 3 * ratio) + 3] > 0);
+    }})()""")
+    assert inked == [False, True]
     assert page.faults == []

@@ -92,6 +92,12 @@ def test_structures_are_grouped_by_what_is_said_of_them() -> None:
     assert surge["poorer"].values == pytest.approx([nan, nan, 40.0], nan_ok=True)
     assert ends(surge["poorer"])[2] == pytest.approx([32.0, 52.0])
     assert np.isnan(yaw["poorer"].values).all(), "nothing has no logarithm"
+    # An interval down to zero ends below all values.
+    wide = replace(every[0].against_best, low=np.zeros(3))
+    made = structures_timeline(
+        StructureComparison((replace(every[0], against_best=wide), *every[1:]), np.ones(3), 5, 100, 20)
+    )
+    assert ends(traces(made.strips[0])["cannot be distinguished from the best"])[0] == pytest.approx([0.5, 1.3])
     # What no structure is is not offered.
     made = structures_timeline(StructureComparison(every[:2], np.ones(3), 5, 100, 20))
     assert "poorer" not in traces(made.strips[0])
@@ -136,7 +142,12 @@ def season() -> BatchResult:
 def test_findings_over_dates_lead_to_the_rows_of_their_logs() -> None:
     made = timelines(season())[0]
     assert made.title == "Thruster force (thruster1), milliampere"
-    assert made.axis.names == ("1.mcap", "2.mcap", "4b.mcap", "4.mcap")
+    assert made.axis.names == (
+        "2024-05-01 00:00 1.mcap",
+        "2024-05-02 00:00 2.mcap",
+        "2024-05-04 00:00 4b.mcap",
+        "2024-05-04 00:00 4.mcap",
+    )
     assert made.axis.links == ("#log-3", "#log-4", "#log-1", "#log-5")
     day = 86400.0
     assert made.t - made.t[0] == pytest.approx([0.0, day, 3.0 * day, 3.0 * day + APART_S])

@@ -15,6 +15,7 @@ from ferryid.errors import FerryIdError, UnwritableError
 from ferryid.simulate import parse_scenario, simulate, write_log
 from ferryid.validation.records import Diagnosis
 from ferryid.validation.source_hash import source_hash
+from ferryid.validation.worker import diagnose_log
 from ferryid.validation.worker_client import WorkerClient
 from ferryid.vessel import load_profile
 from tests.batch.work import ended, environment
@@ -75,6 +76,21 @@ def test_what_cannot_be_written_is_no_diagnosis(tmp_path: Path) -> None:
     )
     with WorkerClient(folder, ("-c", program)) as worker, pytest.raises(UnwritableError, match="the disk is full"):
         diagnosed(worker, folder, "one")
+
+
+def test_an_error_names_files_of_the_case_and_no_folder_of_the_machine(tmp_path: Path) -> None:
+    folder = with_logs(tmp_path / "proof", "one")
+    refused = diagnose_log(folder / "logs/one/one.mcap", folder / "logs/one/vessel.toml", folder / "models/one")
+    assert (refused.verdict, refused.error.partition(":")[0]) == ("refused", "one.mcap")
+    program = (
+        "from ferryid.validation.worker import main\n"
+        "def broken(log, profile, out):\n"
+        "    raise ValueError(f'{log} is odd')\n"
+        "main(broken)\n"
+    )
+    with WorkerClient(folder, ("-c", program)) as worker:
+        crashed = diagnosed(worker, folder, "one")
+    assert crashed.error.startswith("ValueError: one.mcap is odd")
 
 
 def test_one_process_serves_many_logs_and_its_death_costs_one_retry(tmp_path: Path) -> None:

@@ -74,7 +74,7 @@
     }
 
     row(t) {
-      if (this.kind === "date") return date(t, t % day);
+      if (this.kind === "date") return date(t);
       return String(Math.round(t));
     }
 
@@ -84,7 +84,7 @@
       const stretch = ends + (this.kind === "name" ? " of " + this.t.length : "");
       if (cursor === null) return stretch;
       const k = this.nearest(cursor);
-      return stretch + " · cursor " + [this.kind === "name" ? "" : this.row(this.t[k]), this.names[k]].filter(Boolean).join(" ");
+      return stretch + " · cursor " + [this.kind === "number" ? this.row(this.t[k]) : "", this.names[k]].filter(Boolean).join(" ");
     }
 
     next(cursor, side, from, to) {

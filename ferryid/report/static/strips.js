@@ -162,6 +162,7 @@
         if (frame) [low, high] = [Math.min(Math.max(low, frame[0]), frame[1]), Math.max(Math.min(high, frame[1]), frame[0])];
         if (scale === "log") return [low / 1.05, high * 1.05];
         const [bottom, top] = uPlot.rangeNum(low, high, 0.1, true);
+        if (frame) return [Math.max(bottom, frame[0]), Math.min(top, frame[1])];
         return scale === "zero" ? [Math.min(0, low), top] : [bottom, top];
       };
     }
@@ -233,9 +234,25 @@
             ctx.lineTo(x, top);
           });
           ctx.stroke();
+          if (row.strip.frame) known.forEach((k) => this.arrows(plot, at(k)[0], low[k], high[k]));
         }
       });
       ctx.restore();
+    }
+
+    /* Where an interval ends beyond the frame. */
+    arrows(plot, x, low, high) {
+      const { ctx, bbox } = plot;
+      const size = 5 * uPlot.pxRatio;
+      const arrow = (tip, side) => {
+        ctx.beginPath();
+        ctx.moveTo(x, tip);
+        ctx.lineTo(x - size, tip + side * size);
+        ctx.lineTo(x + size, tip + side * size);
+        ctx.fill();
+      };
+      if (high > plot.scales.y.max) arrow(bbox.top, 1);
+      if (low < plot.scales.y.min) arrow(bbox.top + bbox.height, -1);
     }
 
     selected(plot) {

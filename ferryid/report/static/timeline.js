@@ -222,7 +222,10 @@
     /* Go where the point of a row leads. */
     lead(k) {
       const link = this.axis.links && this.axis.links[k];
-      if (link) location.href = link;
+      if (!link) return;
+      /* The page may have hidden the row since it was last led there. */
+      if (location.hash === link) dispatchEvent(new Event("hashchange"));
+      location.href = link;
     }
 
     pressed(event) {
