@@ -147,34 +147,26 @@ def _linearised(made: CampaignFit, candidate: Candidate, share: float) -> Start:
     begun = with_property(made, candidate, share)
     g, q, normal = made.campaign.g, len(candidate.parameters), made.normal
     place = g - len(made.campaign.own)
-    M, across, gained = np.eye(q), np.zeros((g, q)), 0.0
-    r, common = begun.common[place : place + q].copy(), made.common + np.sum(normal.slopes, axis=0)
-    before = common.copy()
-    gained -= 0.5 * float(r @ r)
+    first = begun.common[place : place + q]
+    A, b = np.eye(g + q), np.concatenate([made.common, first])
+    gained = -0.5 * float(first @ first)
     for i, part in enumerate(made.parts):
-        runs = made.campaign.members[i].windows.runs
         here = begun.campaign.gap(i, begun.common, begun.own[i])
         slopes = _slopes(begun, i, range(place, place + q), here)
-        white = made.noise.white(i, np.concatenate([here[:, :, None], slopes], axis=2), runs).reshape(-1, 1 + q)
-        J, was, w, D = part.slopes.reshape(-1, part.slopes.shape[2]), part.gaps.ravel(), white[:, 0], white[:, 1:]
-        with_all, moved = J.T @ D, J.T @ (w - was)
-        factor, own = cho_factor(normal.own[i]), normal.own_slopes[i] + moved[g:]
-        follow = cho_solve(factor, with_all[g:])
-        M += D.T @ D - with_all[g:].T @ follow
-        across += with_all[:g] - normal.back[i].T @ with_all[g:]
-        common += moved[:g] - normal.back[i].T @ moved[g:]
-        r += D.T @ w - follow.T @ own
+        both = np.concatenate([here[:, :, None], slopes], axis=2)
+        white = made.noise.white(i, both, made.campaign.members[i].windows.runs).reshape(-1, 1 + q)
+        J, was, w = part.slopes.reshape(-1, part.slopes.shape[2]), part.gaps.ravel(), white[:, 0]
+        K = np.hstack([J[:, :g], white[:, 1:]])
+        across, before = J[:, g:].T @ K, normal.own_slopes[i]
+        own = before + J[:, g:].T @ (w - was)
+        factor = cho_factor(normal.own[i])
+        A += K.T @ K - across.T @ cho_solve(factor, across)
+        b += K.T @ w - across.T @ cho_solve(factor, own)
         gained += 0.5 * float(was @ was - w @ w)
-        gained += 0.5 * float(
-            own @ cho_solve(factor, own) - normal.own_slopes[i] @ cho_solve(factor, normal.own_slopes[i])
-        )
-    A = np.eye(g) + np.sum(normal.matrices, axis=0)
-    follow = np.linalg.solve(A, across)
-    M -= across.T @ follow
-    r -= follow.T @ common
-    gained += 0.5 * float(common @ np.linalg.solve(A, common) - before @ np.linalg.solve(A, before))
-    gained += 0.5 * float(r @ np.linalg.solve(M, r)) - 0.5 * float(np.linalg.slogdet(M)[1])
-    gained -= candidate.log_alternatives
+        gained += 0.5 * float(own @ cho_solve(factor, own) - before @ cho_solve(factor, before))
+    settled, of_others = made.common + np.sum(normal.slopes, axis=0), A[:g, :g]
+    gained += 0.5 * float(b @ np.linalg.solve(A, b) - settled @ np.linalg.solve(of_others, settled))
+    gained -= 0.5 * float(np.linalg.slogdet(A)[1] - np.linalg.slogdet(of_others)[1]) + candidate.log_alternatives
     return Start(candidate, begun, gained)
 
 
