@@ -8,7 +8,7 @@ BIN = $(VENV)/bin
 DEMO ?= ferryid-out
 
 .PHONY: quick test docs evidence size demo picture bench attack faults real campaign rivals plans thesis proof proof-sea proof-real \
-  wavy fixtures wheel-check lint clean
+  wavy fixtures wheel-check lint clean uplot
 
 # On two cores: by files, so that the fixtures of a file are made once, in the order of tests/conftest.py.
 SPREAD = -n 2 --dist loadfile --no-loadscope-reorder
@@ -159,10 +159,12 @@ $(VENV)/installed: pyproject.toml constraints.txt
 	-$(MAKE) --no-print-directory $(STATIC)/uplot.js
 	touch $@
 
+STATIC = ferryid/report/static
 # The library that draws interactive figures, by npm; where it cannot be had, pages keep their static figures.
+uplot: $(STATIC)/uplot.js
+
 UPLOT = 1.6.32
 UPLOT_SHA256 = 4b8a8191e425658e3ea8c8c1314b0fc679c861ee3a1af2b20c7b16ba50b5133d
-STATIC = ferryid/report/static
 $(STATIC)/uplot.js:
 	mkdir -p build
 	npm pack --silent uplot@$(UPLOT) --pack-destination build

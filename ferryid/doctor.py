@@ -17,6 +17,7 @@ from typing import Any
 import ferryid
 from ferryid.compiler import CacheState, cache_state
 from ferryid.counts import counted
+from ferryid.report.interactive import available
 
 SCHEMA = "ferryid.doctor/1"
 DEVELOPING = ("bench", "docs", "test")
@@ -212,5 +213,10 @@ def _notes(result: Mapping[str, Any]) -> Iterator[str]:
         )
     elif cache["compiled"] < cache["functions"]:
         yield "the first simulate, fit or diagnose compiles its inner loops, which takes 20 to 30 s once"
+    if not available():
+        yield (
+            "figures of reports cannot be zoomed, as uPlot, which draws them, is no part of this installation. Fix: make uplot "
+            "in the sources of ferryid (it needs npm), then install them again"
+        )
     if not result["packages"]:
         yield f"ferryid runs from its sources without being installed ({sys.executable}): its requirements are not known"

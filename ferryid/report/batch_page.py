@@ -289,7 +289,7 @@ def _figures(result: BatchResult, interactive: Interactive) -> list[Figure]:
         tested = []
         if any(row.fit for row in own):
             caption += " The base model and the model fitted to the log itself are tested on the log's validation rows."
-            tested.append("Circles: these two.")
+            tested.append("Circles: the base model (hollow) and the fit.")
         if of:
             caption += f" {of[:1].upper()}{of[1:]} is tested on the whole log."
             tested.append(f"Crosses: {of}.")

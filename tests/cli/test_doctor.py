@@ -31,6 +31,13 @@ def test_a_sound_installation_has_no_problem(ferryid, tmp_path: Path) -> None:
     assert "no problem found" in (text := ferryid("doctor", "--out", tmp_path).out) or "note:" in text
 
 
+@pytest.mark.parametrize("there", [True, False])
+def test_what_figures_lack_is_a_note(there: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor, "available", lambda: there)
+    notes = [one for one in doctor.examine(tmp_path)["notes"] if "uPlot" in one]
+    assert [one.partition("Fix: ")[2][:10] for one in notes] == ([] if there else ["make uplot"])
+
+
 @pytest.mark.slow
 def test_what_stops_commands_is_a_problem(ferryid, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     versions = {"numpy": "1.26.4", "scipy": None}
