@@ -24,7 +24,12 @@ def run(path: Path, folder: Path) -> Any:
     """Return a notebook with the outputs of a run in an empty folder; an error in a cell is raised."""
     book = nbformat.read(path, as_version=4)
     NotebookClient(
-        book, timeout=LONGEST_S, resources={"metadata": {"path": str(folder)}}, record_timing=False
+        book,
+        timeout=LONGEST_S,
+        resources={"metadata": {"path": str(folder)}},
+        record_timing=False,
+        # What is printed comes in as many pieces as the machine is slow.
+        coalesce_streams=True,
     ).execute()
     # What the run, not the notebook, determines.
     book.metadata = {"kernelspec": book.metadata["kernelspec"], "language_info": {"name": "python"}}

@@ -55,6 +55,15 @@ def test_the_outputs_are_those_of_a_run(path: Path, tmp_path: Path) -> None:
         assert alike(old, new), f"cell {place}, {kind}: {old}\n{new}\nFix: python -m tests.docs.notebooks"
 
 
+@pytest.mark.slow
+def test_what_a_slow_machine_prints_in_pieces_is_one_output(tmp_path: Path) -> None:
+    code = "import time\nprint('first', flush=True)\ntime.sleep(0.5)\nprint('second')"
+    book = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(code)])
+    book.metadata = nbformat.read(notebooks()[0], as_version=4).metadata
+    nbformat.write(book, tmp_path / "pieces.ipynb")
+    assert shown(run(tmp_path / "pieces.ipynb", tmp_path)) == [(0, "stdout", "first\nsecond\n")]
+
+
 @pytest.mark.parametrize("path", notebooks(), ids=lambda path: path.stem)
 def test_every_cell_was_run_in_order_and_shows_something(path: Path) -> None:
     book = nbformat.read(path, as_version=4)
