@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
 from multiprocessing import parent_process
-from threading import local
+from threading import Thread, local
 from typing import TypeVar
 
 T = TypeVar("T")
@@ -17,20 +16,40 @@ _alone = False
 
 
 def over(function: Callable[[T], R], items: Iterable[T]) -> list[R]:
-    """Return what a function makes of every item, in their order, on as many threads as there are cores.
+    """Return what a function makes of every item, in their order, on as many threads as there are cores, this one among them.
 
-    On one thread within itself, and in a process that was started as one of several: the cores are busy there already.
+    On one thread within itself, and in a process that was started as one of several: the cores are busy there already. What the
+    first of the items raises that fails is raised here.
     """
     every = list(items)
-    if len(every) < 2 or _cores() < 2 or getattr(_thread, "inside", False):
+    threads = min(_cores(), len(every))
+    if threads < 2 or getattr(_thread, "inside", False):
         return [function(item) for item in every]
+    made: dict[int, R] = {}
+    failed: dict[int, BaseException] = {}
+    left = iter(range(len(every)))
 
-    def inside(item: T) -> R:
+    def work() -> None:
         _thread.inside = True
-        return function(item)
+        try:
+            # What is taken is done, so that all before one that fails are.
+            while not failed and (k := next(left, None)) is not None:
+                try:
+                    made[k] = function(every[k])
+                except BaseException as error:  # noqa: BLE001 - raised below, on the thread that asked
+                    failed[k] = error
+        finally:
+            _thread.inside = False
 
-    with ThreadPoolExecutor(min(_cores(), len(every))) as pool:
-        return list(pool.map(inside, every))
+    others = [Thread(target=work, daemon=True) for _ in range(threads - 1)]
+    for thread in others:
+        thread.start()
+    work()
+    for thread in others:
+        thread.join()
+    if failed:
+        raise failed[min(failed)]
+    return [made[k] for k in range(len(every))]
 
 
 def keep_to_one_thread() -> None:

@@ -45,7 +45,8 @@ def test_as_many_run_at_once_as_there_are_cores() -> None:
         return get_ident()
 
     assert len(set(over(meet, range(CORES)))) == CORES
-    assert get_ident() not in over(meet, range(2 * CORES))
+    # This thread is one of them.
+    assert get_ident() in over(meet, range(CORES))
 
 
 def test_what_one_raises_is_raised() -> None:
@@ -59,7 +60,24 @@ def test_what_one_raises_is_raised() -> None:
     # On one thread, too, and afterwards there are threads again.
     with pytest.raises(KeyError, match="the fifth"):
         over(fails, [4])
-    assert get_ident() not in over(lambda k: get_ident(), range(CORES))
+    together = Barrier(CORES, timeout=10.0)
+    assert over(lambda k: together.wait() < CORES, range(CORES)) == CORES * [True]
+
+
+def test_of_several_that_fail_the_first_is_raised_and_none_begins_afterwards() -> None:
+    together = Barrier(CORES, timeout=10.0)
+    begun = []
+
+    def fails(k: int) -> int:
+        begun.append(k)
+        together.wait()
+        # The last fails first.
+        time.sleep(0.05 * (CORES - k))
+        raise KeyError(k)
+
+    with pytest.raises(KeyError, match="0"):
+        over(fails, range(2 * CORES))
+    assert sorted(begun) == list(range(CORES))
 
 
 def test_calls_within_stay_on_the_thread_that_they_are_made_on() -> None:
@@ -86,7 +104,8 @@ def test_one_of_several_processes_uses_one_thread(monkeypatch: pytest.MonkeyPatc
     with monkeypatch.context() as started:
         started.setattr(parallel, "parent_process", object)
         assert set(over(lambda k: get_ident(), range(4))) == {get_ident()}
-    assert get_ident() not in over(lambda k: get_ident(), range(4))
+    together = Barrier(CORES, timeout=10.0)
+    assert over(lambda k: together.wait() < CORES, range(CORES)) == CORES * [True]
     # What a process really knows of having been started; its own machine has the cores that it has.
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         main = pool.submit(call, get_ident).result(timeout=60.0)

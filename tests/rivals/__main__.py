@@ -8,16 +8,15 @@ Real recordings are left out, and the page says so, where they are absent.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
-from pathlib import Path
 from typing import Any
 
 from tests.evidence import Lines, stamp
 from tests.real.places import REPORTS, ROOT
 from tests.rivals import second_logs
-from tests.rivals.packing import packed, unpacked
+from tests.rivals.packing import unpacked
 from tests.rivals.page import (
     ELSEWHERE,
     HEAD,
@@ -30,14 +29,11 @@ from tests.rivals.page import (
     targets,
     variants_section,
 )
-from tests.rivals.recorded import CASES, Case, Recorded, recorded
-from tests.rivals.second_logs import cases, try_case
-from tests.rivals.simulated import KINDS, Findings, Kind, try_one
+from tests.rivals.recorded import CASES, Recorded
+from tests.rivals.simulated import KINDS, Findings
+from tests.rivals.units import SECOND, Unit, trial_name, units
 
-SECOND = "second log, case "
 WORK = ROOT / "build" / "rivals"
-Unit = tuple[str, Callable[..., Any], tuple[Any, ...]]
-"""Name of a unit of work, and what does it."""
 
 
 def main() -> None:
@@ -53,30 +49,6 @@ def main() -> None:
         run(units(options.trials, options.second, WORK / "logs"), lines, options.processes)
     (REPORTS / "rivals.md").write_text(page(lines.known()), encoding="utf-8")
     stamp(REPORTS / "rivals.md")
-
-
-def units(trials: int, second: int, folder: Path) -> list[Unit]:
-    """Return all units of work: recordings, then the first trial of every kind, the second, and so on, then second logs."""
-    every: list[Unit] = [(case.name, recorded_unit, (case,)) for case in CASES]
-    every += [(trial_name(kind, seed), trial_unit, (kind, seed, folder)) for seed in range(trials) for kind in KINDS]
-    every += [(f"{SECOND}{case.name}", try_case, (case, folder / "second")) for case in cases()[:second]]
-    return every
-
-
-def trial_name(kind: Kind, seed: int) -> str:
-    """Return the name of the unit of a trial."""
-    return f"{kind.name}, trial {seed}"
-
-
-def trial_unit(kind: Kind, seed: int, folder: Path) -> list[dict[str, Any]]:
-    """Return what the methods and the variants find in a trial, as plain values."""
-    return [packed(one) for one in try_one(kind, seed, folder)]
-
-
-def recorded_unit(case: Case) -> dict[str, Any] | None:
-    """Return what comes of a set of recordings, as plain values; None where they are absent."""
-    one = recorded(case)
-    return None if one is None else one.plain()
 
 
 def run(every: Sequence[Unit], lines: Lines, processes: int) -> None:
