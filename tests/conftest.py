@@ -14,6 +14,7 @@ import pytest
 # Before NumPy is loaded: the commands use one thread, and a second one only waits on problems of this size, at full power.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+WORKER = os.environ.get("PYTEST_XDIST_WORKER", "")
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
 
@@ -40,6 +41,18 @@ def nobody_waits_for_the_disk() -> Iterator[None]:
         # What is no open file is an error still.
         patch.setattr(os, "fsync", lambda number: os.fstat(number) and None)
         yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_thread_beside_another_worker() -> None:
+    """Keep diagnoses in this process to one thread where other workers have the other cores.
+
+    Threads on cores that are taken cost a fifth of a diagnosis. Commands and notebooks that tests start have theirs.
+    """
+    if WORKER:
+        from ferryid.diagnose.parallel import keep_to_one_thread
+
+        keep_to_one_thread()
 
 
 # But for tests that are marked as blank.
@@ -121,7 +134,6 @@ def pytest_make_collect_report(collector: pytest.Collector) -> Iterator[None]:
     return report
 
 
-WORKER = os.environ.get("PYTEST_XDIST_WORKER", "")
 BACKWARDS = tuple("13579")
 
 

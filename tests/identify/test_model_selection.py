@@ -167,8 +167,10 @@ def fitted(monkeypatch: pytest.MonkeyPatch, opened: Opened, log: Measured, windo
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("windows_s", [(), WINDOWS_S])
-@pytest.mark.parametrize(("seconds", "gaps"), [(130.0, 0), (240.0, 0), (240.0, 6), (600.0, 12)])
+@pytest.mark.parametrize(
+    ("seconds", "gaps", "windows_s"),
+    [(130.0, 0, ()), (130.0, 0, WINDOWS_S), (240.0, 0, WINDOWS_S), (240.0, 6, ()), (600.0, 12, WINDOWS_S)],
+)
 def test_validation_rows_do_not_reach_the_choice(
     monkeypatch: pytest.MonkeyPatch, opened: Opened, seconds: float, gaps: int, windows_s: tuple[float, ...]
 ) -> None:

@@ -67,7 +67,7 @@ def sailed(
         return np.concatenate([moved, forward(hull, nu, tau(t)[None] + load, nu_c)[0]])
 
     t = np.arange(0.0, seconds, 0.2)
-    path = solve_ivp(rates, (0.0, seconds), np.zeros(6), t_eval=t, rtol=1e-8, atol=1e-8).y.T
+    path = solve_ivp(rates, (0.0, seconds), np.zeros(6), t_eval=t, rtol=1e-7, atol=1e-7).y.T
     rng = np.random.default_rng(3)
     eta = path[:, :3] + rng.standard_normal((len(t), 3)) * [noise, noise, 0.1 * noise]
     nu = path[:, 3:] + rng.standard_normal((len(t), 3)) * [noise, noise, 0.1 * noise]
