@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ferryid.draft.autopilot_parameters import OutputSetting
 from ferryid.draft.fields import ORDERS, numeric_fields, rate_of
 from ferryid.draft.samples import Samples
 from ferryid.ingest.log import Topic
@@ -108,6 +109,8 @@ class ActuatorField:
         Messages per second.
     where
         Fields and values of the messages that are its own, on a topic that carries several actuators.
+    setting
+        What the parameters of an autopilot state of it; None where they do not.
     """
 
     actuator: str
@@ -117,6 +120,7 @@ class ActuatorField:
     path: str
     rate_hz: float
     where: tuple[tuple[str, float], ...] = ()
+    setting: OutputSetting | None = None
 
     @property
     def stream(self) -> str:

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ferryid.draft.actuator_fields import ActuatorField
+from ferryid.draft.autopilot_parameters import NOT_STATED, OutputSetting, Placement
 from ferryid.draft.mapped import MappedSignal, Motion
 from ferryid.draft.samples import Samples
 from ferryid.draft.thresholds import DRAFT
 from ferryid.types import Floats
 from ferryid.vessel.field_words import unit_of_name, words_of
+from ferryid.vessel.pulses import share_of_pulse
 
+USUAL_PULSES_US = (1100.0, 1500.0, 1900.0, 0.0)
+"""Pulses of full astern, neutral and full ahead, and the dead band, where none are stated [us]."""
 UNKNOWN_ORDER = "whether it is an order or was measured: an order has .command behind its name"
 """Doubt of a signal whose name does not state it."""
 _LAGS_S = (0.0, 0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0)
@@ -25,15 +29,18 @@ _AT_ONCE_S = (0.0, 0.2, 0.5)
 
 @dataclass(frozen=True)
 class DraftedActuator:
-    """An actuator: its name, its kind as of `ferryid.vessel.profile.Actuator`, and its signals."""
+    """An actuator: its name, its kind as of `ferryid.vessel.profile.Actuator`, its signals, and what is stated of it."""
 
     name: str
     kind: str
     signals: tuple[MappedSignal, ...]
+    placement: Placement = NOT_STATED
 
 
-def drafted_actuators(fields: Sequence[ActuatorField], samples: Samples, motion: Motion) -> list[DraftedActuator]:
-    """Return the actuators of a log with their signals."""
+def drafted_actuators(
+    fields: Sequence[ActuatorField], samples: Samples, motion: Motion, placements: Mapping[str, Placement] | None = None
+) -> list[DraftedActuator]:
+    """Return the actuators of a log with their signals; `placements` is what parameters state of them, by name."""
     fields = [one for one in fields if (one.stream, one.path) in samples.columns]
     names = list(dict.fromkeys(one.actuator for one in fields))
     chosen = {name: _chosen([one for one in fields if one.actuator == name]) for name in names}
@@ -47,14 +54,46 @@ def drafted_actuators(fields: Sequence[ActuatorField], samples: Samples, motion:
             measured = field.order is None and (role, True) in roles
             signal = _signal(name, kinds[name], role, order, field, samples, measured=measured)
             if role == "angle":
-                signal = _signed(signal, turning)
+                signal = _signed(signal, _as_stated(field, turning))
             elif role == "rudder":
-                signal = _signed(signal, _rudder_sign(field, samples, motion))
+                signal = _signed(signal, _as_stated(field, _rudder_sign(field, samples, motion)))
             elif role == "force" and kinds[name] == "force":
-                signal = _signed(signal, _pair_doubt(name, chosen, samples, motion))
+                signal = _signed(signal, _pair_doubt(name, "force", chosen, samples, motion))
+            elif role == "duty" and field.setting is not None and field.setting.pushes_ahead:
+                signal = _signed(signal, _ahead_sign(field, samples, motion))
+                _, evidence, doubt = _pair_doubt(name, "duty", chosen, samples, motion)
+                signal = _signed(signal, (signal.sign, evidence, doubt))
+            elif field.setting is not None:
+                signal = replace(signal, sign=field.setting.sign)
             signals.append(signal)
-        found.append(DraftedActuator(name, kinds[name], tuple(signals)))
+        placement = (placements or {}).get(name, NOT_STATED)
+        found.append(DraftedActuator(name, placement.kind or kinds[name], tuple(signals), placement))
     return found
+
+
+def _as_stated(field: ActuatorField, seen: _Sign) -> _Sign:
+    """Return the sign that the motion shows, or else the one that parameters state; a doubt where they disagree."""
+    setting = field.setting
+    if setting is None or not setting.in_pulses:
+        return seen
+    value, evidence, doubt = seen
+    if not evidence:
+        return setting.sign, "", f"{doubt.partition(':')[0]}: it is that of {setting.sign_by}"
+    if value != setting.sign:
+        return value, evidence, f"{setting.sign_by} states the other sign: the motion decides"
+    return value, evidence, ""
+
+
+def _ahead_sign(field: ActuatorField, samples: Samples, motion: Motion) -> _Sign:
+    """Return the stated sign of what pushes ahead, and a doubt where the vessel goes astern when it does."""
+    setting = field.setting
+    if setting is None:
+        return 1.0, "", ""
+    seen = setting.sign * _response(_on_grid(field, samples), motion.u, _step(samples))
+    if seen <= -DRAFT.acts:
+        doubt = f"{setting.sign_by}, but the vessel goes slower ahead when it pushes ahead (correlation {seen:.2f})"
+        return setting.sign, "", f"{doubt}: the sign may be the other one, or the velocity's"
+    return setting.sign, "", ""
 
 
 _Roles = dict[tuple[str, bool], ActuatorField]
@@ -94,10 +133,11 @@ def _signal(
     is_output = re.fullmatch(r"output[0-9]+", name) is not None
     low = float(np.quantile(values, 0.01)) if values.size else 0.0
     unit, why, doubt = _unit(role, field, largest, low)
+    stated = field.setting or OutputSetting()
     shown = "an order, by its name" if order else "feedback, by its name" if field.order is False else ""
     if measured:
         shown = "feedback, as another field of the actuator is the order"
-    evidence = (*filter(None, [shown]), f"{unit}: {why}")
+    evidence = (*filter(None, [shown]), *stated.evidence, why if stated.in_pulses else f"{unit}: {why}")
     return MappedSignal(
         f"{name}.{quantity}{'.command' if order else ''}",
         field.topic,
@@ -110,6 +150,7 @@ def _signal(
                 None,
                 [
                     doubt,
+                    *stated.doubts,
                     "" if field.order is not None or measured else UNKNOWN_ORDER,
                     "what this output of the autopilot drives: a thruster, or a rudder, which is an actuator of kind "
                     '"propeller_rudder" with NAME.rudder.command'
@@ -118,6 +159,8 @@ def _signal(
                 ],
             )
         ),
+        pulse_us=stated.pulse_us,
+        full_deg=stated.full_deg,
     )
 
 
@@ -132,6 +175,8 @@ def _share(least: float, largest: float, shown: str) -> tuple[str, str, str]:
 
 def _unit(role: str, field: ActuatorField, largest: float, least: float = 0.0) -> tuple[str, str, str]:
     """Return unit, why, and what to check."""
+    if field.setting is not None and field.setting.in_pulses:
+        return "us", "pulses, as all outputs of ArduPilot are", ""
     kind = {"angle": "angle", "rudder": "angle", "force": "force", "speed": "rotation", "duty": "fraction"}[role]
     # In messages a number in brackets is the place in an array.
     stated = "" if re.search(r"\[[0-9]+\]$", field.path) else unit_of_name(field.path, kind)
@@ -168,7 +213,13 @@ def _signed(signal: MappedSignal, sign: _Sign) -> MappedSignal:
 
 
 def _on_grid(field: ActuatorField, samples: Samples) -> Floats:
-    return samples.on_grid(field.stream, samples.raw(field.stream, field.path), held=True)
+    """Return a field on the grid; an output whose pulses are stated as a share of full power, or as an angle [rad]."""
+    values, setting = samples.raw(field.stream, field.path), field.setting
+    if setting is not None and setting.pulse_us is not None:
+        values = (np.radians(setting.full_deg) or 1.0) * share_of_pulse(values, setting.pulse_us)
+    elif setting is not None and setting.in_pulses:
+        values = share_of_pulse(values, USUAL_PULSES_US)
+    return samples.on_grid(field.stream, values, held=True)
 
 
 def _response(cause: Floats, effect: Floats, step_s: float) -> float:
@@ -246,8 +297,12 @@ def _azimuth_sign(chosen: dict[str, _Roles], kinds: dict[str, str], samples: Sam
         if angle is None:
             continue
         turn = np.pi / 180.0 if _unit("angle", angle, _largest(angle, samples))[0] == "deg" else 1.0
-        speed = _any(chosen[name], "speed")
+        speed, duty = _any(chosen[name], "speed"), _any(chosen[name], "duty")
+        if speed is None and duty is not None and duty.setting is not None:
+            speed = duty
         push = np.ones(side.shape) if speed is None else _on_grid(speed, samples)
+        if speed is not None and speed.setting is not None:
+            push = speed.setting.sign * push
         side = side + push * np.abs(push) * np.sin(_on_grid(angle, samples) * turn)
     if len(names) == 1:
         seen = -_turning(side, motion.r, _step(samples))[0]
@@ -269,11 +324,11 @@ def _largest(field: ActuatorField, samples: Samples) -> float:
     return float(np.quantile(np.abs(values), 0.99)) if values.size else 0.0
 
 
-def _pair_doubt(name: str, chosen: dict[str, _Roles], samples: Samples, motion: Motion) -> _Sign:
+def _pair_doubt(name: str, role: str, chosen: dict[str, _Roles], samples: Samples, motion: Motion) -> _Sign:
     """Return what the yaw rate shows of two forces side by side: more to port turns to starboard."""
     sides = {}
     for other, roles in chosen.items():
-        field = _any(roles, "force")
+        field = _any(roles, role)
         words = set(other.split("_"))
         if field is not None and words & {"left", "port"}:
             sides["port"] = field
@@ -281,7 +336,11 @@ def _pair_doubt(name: str, chosen: dict[str, _Roles], samples: Samples, motion: 
             sides["starboard"] = field
     if len(sides) < 2 or not set(name.split("_")) & {"left", "right", "port", "starboard"}:
         return 1.0, "", ""
-    more = _on_grid(sides["port"], samples) - _on_grid(sides["starboard"], samples)
+    port, starboard = (
+        (1.0 if one.setting is None else one.setting.sign) * _on_grid(one, samples)
+        for one in (sides["port"], sides["starboard"])
+    )
+    more = port - starboard
     # Without the fallback on the yaw rate: nothing else than a doubt hangs on it.
     seen = _turns(more, motion.r, _step(samples))
     if seen > DRAFT.acts:

@@ -1,22 +1,28 @@
-"""What the autopilots PX4 and ArduPilot record: the names are theirs, the boat's are not in their logs."""
+"""What the autopilots PX4 and ArduPilot record: the names are theirs; what they steer, their parameters state."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ferryid.draft.actuator_fields import ActuatorField
+from ferryid.draft.autopilot_parameters import OutputSetting, Placement, UsedValues
+from ferryid.draft.control_allocation import rotor_placements, rudder_evidence, rudders_alone
 from ferryid.draft.fields import FieldGroup, rate_of
 from ferryid.draft.samples import Samples
+from ferryid.draft.servo_functions import configured_outputs
 from ferryid.ingest.log import Topic
+from ferryid.ingest.parameters import Parameter
 
 _ORDERS = (
     ("actuator_motors", "control[{}]", 0, "motor", "duty"),
     ("actuator_servos", "control[{}]", 0, "servo", "rudder"),
     ("actuator_outputs", "output[{}]", 0, "output", "duty"),
     ("RCOU", "C{}", 1, "output", "duty"),
+    ("RCO2", "C{}", 15, "output", "duty"),
+    ("RCO3", "C{}", 19, "output", "duty"),
 )
 """Topic, field, number of the first, name and role of what autopilots order."""
 _MOST = 16
@@ -53,14 +59,53 @@ def autopilot_fields(topics: Sequence[Topic]) -> list[ActuatorField]:
     for name, path, first, base, role in _ORDERS:
         topic = by_name.get(name)
         # Outputs are what motors and servos become, in pulses.
-        if topic is None or topic.count < 2 or (base == "output" and found):
+        if topic is None or topic.count < 2 or (name == "actuator_outputs" and found):
             continue
         found += [
-            ActuatorField(f"{base}{k + 1}", role, True, topic.name, path.format(k + first), rate_of(topic))
+            ActuatorField(f"{base}{k + (first or 1)}", role, True, topic.name, path.format(k + first), rate_of(topic))
             for k in range(_MOST)
             if path.format(k + first) in topic.fields
         ]
     return found
+
+
+@dataclass(frozen=True)
+class Orders:
+    """The orders of an autopilot that change, what is stated of each thruster by its name, and what a person has to check."""
+
+    fields: tuple[ActuatorField, ...]
+    placements: Mapping[str, Placement] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
+
+
+def orders(fields: Sequence[ActuatorField], samples: Samples, parameters: Mapping[str, Parameter]) -> Orders:
+    """Return the orders of an autopilot that change, as its parameters state what they drive.
+
+    Parameters
+    ----------
+    fields
+        All orders of the log, of `autopilot_fields`.
+    samples
+        The orders as recorded.
+    parameters
+        Parameters of the log by name; without them the orders keep the names of motors, servos or outputs.
+    """
+    values = UsedValues(parameters, samples)
+    if any(one.actuator.startswith("output") for one in fields):
+        outputs = configured_outputs(fields, values, samples)
+        if outputs is None:
+            return Orders(tuple(moving(fields, samples)))
+        return Orders(outputs.fields, outputs.placements, outputs.remarks)
+    chosen = moving(rudders_alone(fields, values), samples)
+    rudders = [one for one in chosen if one.role == "rudder"]
+    chosen = [
+        replace(one, setting=OutputSetting(evidence=(stated,)))
+        if one.role == "rudder" and (stated := rudder_evidence(one, values))
+        else one
+        for one in chosen
+    ]
+    placements, remarks = rotor_placements([one.actuator for one in chosen if one not in rudders], fields, values)
+    return Orders(tuple(chosen), placements, tuple(remarks))
 
 
 def moving(fields: Sequence[ActuatorField], samples: Samples) -> list[ActuatorField]:
@@ -70,10 +115,10 @@ def moving(fields: Sequence[ActuatorField], samples: Samples) -> list[ActuatorFi
     knows what a servo turns.
     """
     kept = []
-    for field in fields:
-        values = samples.raw(field.stream, field.path) if (field.stream, field.path) in samples.columns else np.empty(0)
+    for one in fields:
+        values = samples.raw(one.stream, one.path) if (one.stream, one.path) in samples.columns else np.empty(0)
         if np.unique(values[np.isfinite(values)]).size > 1:
-            kept.append(field)
+            kept.append(one)
     motors = [one for one in kept if not one.actuator.startswith("servo")]
     servos = [one for one in kept if one.actuator.startswith("servo")]
     if not servos or len(servos) != len(motors):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ferryid.draft.actuator_fields import actuator_fields, parted, shared_topics
 from ferryid.draft.actuators import UNKNOWN_ORDER, DraftedActuator, drafted_actuators
-from ferryid.draft.autopilots import autopilot_fields, autopilot_groups, moving, with_frames
+from ferryid.draft.autopilots import Orders, autopilot_fields, autopilot_groups, orders, with_frames
 from ferryid.draft.fields import navigation_groups
 from ferryid.draft.kinematics import navigation_signals
 from ferryid.draft.mapped import MappedSignal
@@ -17,6 +17,7 @@ from ferryid.draft.wind import wind_fields, wind_signal
 from ferryid.errors import FerryIdError
 from ferryid.ingest import open_log
 from ferryid.ingest.log import Topic
+from ferryid.ingest.parameters import parameters_of
 from ferryid.types import TimeRanges
 from ferryid.vessel.field_words import words_of
 from ferryid.vessel.profile import Profile
@@ -43,6 +44,8 @@ class Draft:
     unused_fields
         Of topics of which something is mapped: the further columns of a log that is one table, and fields that look like an
         actuator's.
+    remarks
+        What a person has to check of the log as a whole: parameters of an autopilot that contradict what it recorded.
     """
 
     log: str
@@ -52,6 +55,7 @@ class Draft:
     notes: tuple[str, ...]
     unused: tuple[str, ...]
     unused_fields: tuple[tuple[str, str], ...] = ()
+    remarks: tuple[str, ...] = ()
 
     @property
     def every(self) -> tuple[MappedSignal, ...]:
@@ -103,7 +107,8 @@ def draft_profile(log: str | Path, like: Profile | None = None, ranges: TimeRang
             f"{log}: {_nothing(topics)}. Fix: write the signal map by hand, see ferryid vessel show --toml"
         )
     samples = read_samples(reader, wanted, str(log), ranges)
-    fields = moving(fields, samples) if autopilot else fields
+    driven = orders(fields, samples, parameters_of(reader)) if autopilot else Orders(tuple(fields))
+    fields = list(driven.fields)
     for bus in shared:
         more, samples = parted(bus, samples)
         fields += more
@@ -113,7 +118,7 @@ def draft_profile(log: str | Path, like: Profile | None = None, ranges: TimeRang
             f"{log}: no field looks like a heading that changes, found {_listed([one.label for one in groups])}. Fix: record "
             "the heading, or write the signal map by hand, see ferryid vessel show --toml"
         )
-    actuators = drafted_actuators(fields, samples, motion)
+    actuators = drafted_actuators(fields, samples, motion, driven.placements)
     if not actuators:
         raise FerryIdError(
             f"{log}: no field looks like an actuator's speed, angle, force or order, found the topics "
@@ -136,6 +141,7 @@ def draft_profile(log: str | Path, like: Profile | None = None, ranges: TimeRang
         notes,
         tuple(t.name for t in topics if t.name not in used),
         _left_over([t for t in topics if t.name in used], mapped, {(one.topic, one.path) for one in fields}, like),
+        driven.remarks,
     )
 
 

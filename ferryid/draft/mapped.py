@@ -23,6 +23,10 @@ class MappedSignal:
         What the log shows for unit, frame and sign, a sentence each.
     doubts
         What a person has to check, a sentence each.
+    pulse_us
+        Pulses of full astern, neutral and full ahead, and the dead band [us]; None where they are not stated.
+    full_deg
+        Angle at full travel [deg], 0 where it is not stated.
     """
 
     quantity: str
@@ -35,6 +39,8 @@ class MappedSignal:
     doubts: tuple[str, ...] = ()
     options: tuple[tuple[str, str], ...] = ()
     where: tuple[tuple[str, float], ...] = ()
+    pulse_us: tuple[float, float, float, float] | None = None
+    full_deg: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -84,6 +84,8 @@ def _full_key(signal: MappedSignal) -> str:
     """Return the key of a signal that is a share of full power or travel, empty for others."""
     if signal.unit not in ("%", "fraction", "us"):
         return ""
+    if signal.full_deg:
+        return ""
     role = signal.quantity.partition(".")[2].removesuffix(".command")
     return {"speed": "full_rpm", "angle": "full_deg", "rudder": "full_deg"}.get(role, "")
 
@@ -117,6 +119,7 @@ def as_json(draft: Draft, file: str, text: str) -> dict[str, Any]:
             }
             for one in draft.every
         ],
+        "check": list(draft.remarks),
         "unused": list(draft.unused),
         "unused_fields": [{"topic": topic, "field": path} for topic, path in draft.unused_fields],
     }
@@ -130,6 +133,12 @@ def as_text(draft: Draft, file: str, text: str) -> str:
         how = ", ".join(filter(None, [one.unit, one.frame, "sign -1" if one.sign < 0.0 else ""]))
         lines.append(f"  {one.quantity:<{wide}}  {stream_name(one.topic, one.where)}: {', '.join(one.fields)}  [{how}]")
         lines += [f"  {'':<{wide}}    check: {doubt}" for doubt in one.doubts]
+    for actuator in draft.actuators:
+        place = actuator.placement
+        if place.evidence or place.doubts:
+            lines.append(f"  {actuator.name:<{wide}}  {'; '.join(place.evidence)}")
+            lines += [f"  {'':<{wide}}    check: {doubt}" for doubt in place.doubts]
+    lines += [f"  check: {remark}" for remark in draft.remarks]
     lines += [f"  not mapped of {topic}: {', '.join(paths)}" for topic, paths in _by_topic(draft).items()]
     count = open_lines(text)
     todo = f"fill in {counted(count, 'line')} marked {MARK.removeprefix('# ').rstrip(':')}, then " if count else ""
@@ -164,8 +173,10 @@ def questions(draft: Draft) -> list[Question]:
             )
         if one.name in known:
             continue
-        asked.append(Question(f"{one.name}.x_m", f"{one.name}: metres ahead of midship (negative astern)", "-2.0"))
-        asked.append(Question(f"{one.name}.y_m", f"{one.name}: metres to starboard (negative to port)", "0.0"))
+        if one.placement.position_m is None:
+            x, y = one.placement.hint_m
+            asked.append(Question(f"{one.name}.x_m", f"{one.name}: metres ahead of midship (negative astern)", f"{x}"))
+            asked.append(Question(f"{one.name}.y_m", f"{one.name}: metres to starboard (negative to port)", f"{y}"))
         if one.kind != "force":
             asked.append(
                 Question(f"{one.name}.full", f"{one.name}: a speed [rpm] at which its thrust is known", "1000")
@@ -211,6 +222,7 @@ def draft_text(draft: Draft, answers: Answers) -> str:
         f"# Lines marked {MARK.removeprefix('# ')} are what no log shows: remove the mark and correct the number. Evidence",
         "# stands above each signal, CHECK is what is assumed. Then: ferryid vessel check, ferryid inspect, ferryid fit.",
         *(f"# Log: {note}." for note in draft.notes),
+        *(f"# CHECK: {remark}." for remark in draft.remarks),
         "",
     ]
     lines += _hull(answers) if like is None else _like_sections(draft, like.text)
@@ -277,13 +289,25 @@ def _wind_load(answers: Answers, length: str | None) -> list[str]:
 
 
 def _actuator(one: DraftedActuator, answers: Answers) -> list[str]:
+    stated = one.placement
     x, y = _number(answers, f"{one.name}.x_m"), _number(answers, f"{one.name}.y_m")
+    if stated.position_m is not None:
+        x, y = (f"{value:g}" for value in stated.position_m)
+    hint = ", ".join(f"{value}" for value in stated.hint_m)
     place = (
         f"position_m = [{x}, {y}]"
         if x and y
-        else f"{MARK} position_m = [-2.0, 0.0]    # x ahead, y to starboard of midship"
+        else f"{MARK} position_m = [{hint}]    # x ahead, y to starboard of midship"
     )
-    lines = ["[[actuator]]", f'name = "{one.name}"', f'kind = "{one.kind}"', place]
+    doubts = [*stated.doubts, *_turned(one, x, y)]
+    lines = [*(f"# {line}." for line in stated.evidence), *(f"# CHECK: {doubt}." for doubt in doubts)]
+    lines += ["[[actuator]]", f'name = "{one.name}"', f'kind = "{one.kind}"', place]
+    if stated.angle_deg and one.kind == "propeller":
+        lines.append(f"angle_deg = {stated.angle_deg:g}    # where it pushes to, clockwise from ahead")
+    if stated.count > 1:
+        lines.append(
+            f"count = {stated.count}    # side by side, as one: position_m is the middle, the thrust that of one"
+        )
     if one.kind == "force":
         return [*lines, ""]
     if one.kind == "propeller_rudder":
@@ -303,6 +327,19 @@ def _actuator(one: DraftedActuator, answers: Answers) -> list[str]:
             for key, _, hint, what in _RUDDER[1:]
         ]
     return [*lines, ""]
+
+
+def _turned(one: DraftedActuator, x: str | None, y: str | None) -> list[str]:
+    """Return how the place of a thruster contradicts the way in which the autopilot turns the vessel by it."""
+    stated = one.placement
+    if not (x and y and stated.turns):
+        return []
+    angle = math.radians(stated.angle_deg or 0.0) if one.kind != "tunnel" else 0.5 * math.pi
+    arm = float(x) * math.sin(angle) - float(y) * math.cos(angle)
+    side = "starboard" if stated.turns > 0 else "port"
+    if arm * stated.turns > 0.0:
+        return []
+    return [f"at this place it does not turn the vessel to {side}, as the autopilot takes it to"]
 
 
 def _usual_thrust(diameter: str | None) -> str:
@@ -364,13 +401,19 @@ def _signal(signal: MappedSignal, answers: Answers) -> list[str]:
         lines.append(f"where = {{ {chosen} }}")
     if signal.unit != "quaternion":
         lines.append(f"unit = {_text(signal.unit)}")
-    if signal.unit == "us":
+    if signal.pulse_us is not None:
+        *pulses, dead = (f"{value:g}" for value in signal.pulse_us)
+        lines.append(f"pulse_us = [{', '.join(pulses)}]    # full astern, neutral, full ahead")
+        lines += [f"dead_band_us = {dead}"] if dead != "0" else []
+    elif signal.unit == "us":
         lines.append(
             "pulse_us = [1100, 1500, 1900]    # full astern, neutral, full ahead; dead_band_us = ... beside neutral"
         )
     if key := _full_key(signal):
         what, hint = _FULL[key]
         lines.append(_entry(answers, f"{signal.quantity.partition('.')[0]}.{key}", key, hint, what))
+    if signal.full_deg:
+        lines.append(f"full_deg = {signal.full_deg:g}")
     lines += [f"{key} = {_text(value)}" for key, value in signal.options]
     if signal.frame:
         lines.append(f"frame = {_text(signal.frame)}")

@@ -7,7 +7,8 @@ the head of every message, and decodes none but the definitions.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from ferryid.errors import FerryIdError
 from ferryid.ingest.formats.dataflash import FMT, HEAD_BYTES, SYNC
 from ferryid.ingest.log import Loss, TableLayout
+from ferryid.ingest.parameters import Parameter, gathered, together
 from ferryid.ingest.records import (
     RecordField,
     RecordReader,
@@ -24,6 +26,7 @@ from ferryid.ingest.records import (
     damage_loss,
     file_bytes,
     instance_name,
+    times_of,
     utc_offset_ns,
     with_places,
 )
@@ -92,7 +95,16 @@ def open_dataflash(path: Path, layout: TableLayout | None) -> RecordReader:
     losses = damage_loss(path, "ArduPilot log", scan.stretches, scan.lost_bytes)
     if scan.cut:
         losses.append(Loss(str(path), "the ArduPilot log ends within a message: the end of the recording is missing"))
-    return RecordReader(path, data, tables, losses, encoding="dataflash", since_ns=since_ns or 0, note=note)
+    return RecordReader(
+        path,
+        data,
+        tables,
+        losses,
+        encoding="dataflash",
+        since_ns=since_ns or 0,
+        note=note,
+        parameters=partial(_parameters, scan),
+    )
 
 
 def _scanned(raw: bytes) -> _Scan:
@@ -161,6 +173,21 @@ def _tables(data: NDArray[np.uint8], scan: _Scan, layout: _Layout, places: NDArr
     """Return the topics of one message: one, or one for each instance that its definition names."""
     if layout.name in _DEFINITIONS or not len(places):
         return []
+    whole = _whole(layout, places)
+    if whole is None:
+        return []
+    label = _instance_label(data, scan, layout)
+    if not label or whole.fields[label].dtype.kind not in "iu":
+        return [whole]
+    numbers = column_of(data, whole, label)
+    return [
+        with_places(replace(whole, name=instance_name(layout.name, int(number))), places[numbers == number])
+        for number in np.unique(numbers)
+    ]
+
+
+def _whole(layout: _Layout, places: NDArray[np.int64]) -> RecordTable | None:
+    """Return all messages of one definition as a topic, None where they have no time."""
     fields: dict[str, RecordField] = {}
     at = 0
     for letter, label in zip(layout.letters, layout.labels, strict=True):
@@ -172,19 +199,22 @@ def _tables(data: NDArray[np.uint8], scan: _Scan, layout: _Layout, places: NDArr
         at += _size(letter)
     clock = next((name for name in _TIMES if name in fields and fields[name].dtype.kind in "iu"), None)
     if clock is None:
-        return []
-    whole = RecordTable(instance_name(layout.name, 0), layout.name, fields, places, clock, _TIMES[clock])
-    label = _instance_label(data, scan, layout)
-    if not label or fields[label].dtype.kind not in "iu":
-        return [whole]
-    numbers = column_of(data, whole, label)
-    return [
-        with_places(
-            RecordTable(instance_name(layout.name, int(number)), layout.name, fields, places, clock, _TIMES[clock]),
-            places[numbers == number],
-        )
-        for number in np.unique(numbers)
-    ]
+        return None
+    return RecordTable(instance_name(layout.name, 0), layout.name, fields, places, clock, _TIMES[clock])
+
+
+def _parameters(scan: _Scan, data: NDArray[np.uint8], since_ns: int) -> dict[str, Parameter]:
+    """Return the parameters that the messages PARM state."""
+    found = []
+    for number, layout in scan.layouts.items():
+        places = np.asarray(scan.places.get(number, ()), np.int64)
+        table = _whole(layout, places) if layout.name == "PARM" and len(places) else None
+        if table is None or not {"Name", "Value"} <= table.fields.keys() or table.fields["Value"].dtype.kind == "S":
+            continue
+        times, good = times_of(data, table, table.time, since_ns)
+        names, values = column_of(data, table, "Name"), np.asarray(column_of(data, table, "Value"), np.float64)
+        found.append(gathered([str(one) for one in names[good]], times[good], values[good]))
+    return together(found)
 
 
 def _instance_label(data: NDArray[np.uint8], scan: _Scan, layout: _Layout) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.ingest.log import Loss, Reader, Series, Topic
+from ferryid.ingest.parameters import Parameter, parameters_of, together
 
 
 def join(parts: Sequence[Reader]) -> Reader:
@@ -33,6 +34,11 @@ class JoinedReader:
         self.paths: tuple[Path, ...] = tuple(path for part in self._parts for path in part.paths)
         self.topics: tuple[Topic, ...] = _merged(self._parts)
         self.losses: tuple[Loss, ...] = tuple(loss for part in self._parts for loss in part.losses)
+
+    @property
+    def parameters(self) -> Mapping[str, Parameter]:
+        """Parameters of all parts, one part after another."""
+        return together([parameters_of(part) for part in self._parts])
 
     def read(self, wanted: Mapping[str, Sequence[str]], *, verify: bool = False) -> dict[str, Series]:
         """Decode the wanted fields of the wanted topics in every part.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.ingest.log import Column, Loss, Series, Topic
+from ferryid.ingest.parameters import Parameter
 from ferryid.types import Nanoseconds
 
 FARTHEST_NS = 1 << 62
@@ -113,12 +114,32 @@ class RecordReader:
         encoding: str,
         since_ns: int,
         note: str,
+        parameters: Callable[[NDArray[np.uint8], int], Mapping[str, Parameter]],
     ) -> None:
         self.paths: tuple[Path, ...] = (path,)
         self._tables = {table.name: table for table in tables}
         self._since_ns = since_ns
+        self._parameters = parameters
+        self._size = len(data)
         self.losses = tuple(losses)
         self.topics = tuple(_topic(data, table, encoding, since_ns, note) for table in self._tables.values())
+
+    @property
+    def parameters(self) -> Mapping[str, Parameter]:
+        """Parameters of the autopilot by name, decoded when asked for.
+
+        Raises
+        ------
+        FerryIdError
+            For a log that became shorter since it was opened.
+        """
+        data = file_bytes(self.paths[0])
+        if len(data) < self._size:
+            raise self._shorter()
+        return self._parameters(data, self._since_ns)
+
+    def _shorter(self) -> FerryIdError:
+        return FerryIdError(f"{self.paths[0]}: the log became shorter while it was read. Fix: wait until it is copied")
 
     def read(self, wanted: Mapping[str, Sequence[str]], *, verify: bool = False) -> dict[str, Series]:
         """Decode the wanted fields; see `ferryid.ingest.log.Reader.read`. There are no checksums that `verify` could check."""
@@ -141,7 +162,7 @@ class RecordReader:
         for name, fields in wanted.items():
             table = self._tables[name]
             if len(table.places) and int(table.places[-1]) + _size(table) > len(data):
-                raise FerryIdError(f"{path}: the log became shorter while it was read. Fix: wait until it is copied")
+                raise self._shorter()
             series[name], lost = self._series(data, table, tuple(fields))
             known_losses = {(loss.what, loss.topic) for loss in self.losses}
             self.losses += tuple(loss for loss in lost if (loss.what, loss.topic) not in known_losses)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 import struct
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 from ferryid.ingest.log import Loss, TableLayout
+from ferryid.ingest.parameters import Parameter, gathered
 from ferryid.ingest.records import (
     RecordField,
     RecordReader,
@@ -25,6 +27,7 @@ from ferryid.ingest.records import (
     damage_loss,
     file_bytes,
     instance_name,
+    times_of,
     utc_offset_ns,
     with_places,
 )
@@ -58,6 +61,8 @@ class _Scan:
     sizes: dict[int, tuple[int, int]] = field(default_factory=dict)
     """Message id to the size of its data without trailing padding, and with it."""
     places: dict[int, list[int]] = field(default_factory=dict)
+    parameters: list[tuple[int, str, float]] = field(default_factory=list)
+    """Where each value of a parameter stands in the file [bytes], its name, and the value."""
     untimed: list[str] = field(default_factory=list)
     stretches: int = 0
     lost_bytes: int = 0
@@ -89,8 +94,32 @@ def open_ulog(path: Path, layout: TableLayout | None) -> RecordReader:
         else "times of the autopilot in UTC, as its receiver had it"
     )
     return RecordReader(
-        path, data, _merged(tables), _losses(path, scan), encoding="ulog", since_ns=since_ns or 0, note=note
+        path,
+        data,
+        _merged(tables),
+        _losses(path, scan),
+        encoding="ulog",
+        since_ns=since_ns or 0,
+        note=note,
+        parameters=partial(_parameters, scan, tables),
     )
+
+
+def _parameters(scan: _Scan, tables: list[RecordTable], data: NDArray[np.uint8], since_ns: int) -> dict[str, Parameter]:
+    """Return the parameters of the log; a value has no time of its own, but that of the data before it."""
+    if not scan.parameters:
+        return {}
+    before = []
+    for table in tables:
+        times, good = times_of(data, table, table.time, since_ns)
+        before.append(np.column_stack([table.places[good], times[good]]))
+    rows = np.concatenate(before)
+    rows = rows[np.argsort(rows[:, 0], kind="stable")]
+    # What stands in the header holds from the first message on.
+    places = np.asarray([place for place, _, _ in scan.parameters], np.int64)
+    times = rows[np.clip(np.searchsorted(rows[:, 0], places) - 1, 0, len(rows) - 1), 1] if len(rows) else 0 * places
+    values = np.asarray([value for _, _, value in scan.parameters], np.float64)
+    return gathered([name for _, name, _ in scan.parameters], times, values)
 
 
 def _merged(tables: list[RecordTable]) -> list[RecordTable]:
@@ -155,6 +184,8 @@ def _scanned(path: Path, raw: bytes) -> _Scan:
             and after <= end
             and _taken(path, scan, kind, raw[position + 3 : after], appended)
         ):
+            if kind == 80:  # P, a parameter
+                _keep_parameter(scan, position, raw[position + 3 : after])
             position = after
             continue
         if after > end and _plausible(raw, position, scan, inside=False):
@@ -200,6 +231,14 @@ def _taken(path: Path, scan: _Scan, kind: int, content: bytes, appended: list[in
     elif letter in "LC":
         return len(content) >= 9 and content[0] in b"01234567"
     return True
+
+
+def _keep_parameter(scan: _Scan, position: int, content: bytes) -> None:
+    """Keep the value of a parameter, as its key has its type: ``float CA_ROTOR0_PX``."""
+    key, value = content[1 : 1 + content[0]], content[1 + content[0] :]
+    kind, _, name = key.decode("ascii").partition(" ")
+    if kind in ("float", "int32_t") and len(value) == 4:
+        scan.parameters.append((position, name, float(np.frombuffer(value, _TYPES[kind])[0])))
 
 
 def _flags(path: Path, content: bytes, appended: list[int]) -> bool:

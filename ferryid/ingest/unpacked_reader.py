@@ -9,6 +9,7 @@ from pathlib import Path
 from ferryid.errors import FerryIdError
 from ferryid.files import remove_scratch
 from ferryid.ingest.log import Loss, Reader, Series, TableLayout, Topic
+from ferryid.ingest.parameters import Parameter, parameters_of
 from ferryid.ingest.unpack import codec_of, unpack_file, working_folder
 
 
@@ -43,6 +44,11 @@ class UnpackedLog:
         """What unpacking lost, then what the log inside lacks."""
         inner = (replace(one, file=str(self.paths[0]), what=self._told(one.what)) for one in self._inner.losses)
         return (*self._lost, *inner)
+
+    @property
+    def parameters(self) -> Mapping[str, Parameter]:
+        """Parameters of the log inside."""
+        return parameters_of(self._inner)
 
     def read(self, wanted: Mapping[str, Sequence[str]], *, verify: bool = False) -> dict[str, Series]:
         """Decode the wanted fields of the log inside.

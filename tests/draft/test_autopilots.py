@@ -13,7 +13,7 @@ from ferryid.draft import Answers, Draft, draft_profile, draft_text, questions
 from ferryid.errors import FerryIdError
 from ferryid.signals.recording import record
 from ferryid.vessel import check_profile, load_profile, parse_profile
-from tests.draft.test_draft import Columns, sailed
+from tests.draft.test_draft import Columns
 from tests.ingest.autopilot_logs import DataFlash, ulog
 
 BOAT = """schema = "ferryid.vessel/1"
@@ -30,18 +30,16 @@ thrust = { kind = "quadratic", ahead = 0.01 }
 """
 
 
-@pytest.fixture(scope="module")
-def trial() -> Columns:
-    """A trial with velocity over ground, and latitude and longitude near Trondheim [deg]."""
-    made = sailed(120.0)
-    u, v, psi = made["u"], made["v"], made["psi"]
-    made["vn"], made["ve"] = u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi)
-    made["lat"] = 63.4 + np.degrees(made["N"] / 6.371e6)
-    made["lon"] = 10.4 + np.degrees(made["E"] / (6.371e6 * np.cos(np.radians(63.4))))
-    return made
-
-
-def px4(trial: Columns, *, actuators: bool = True, heading: bool = True) -> bytes:
+def px4(
+    trial: Columns,
+    *,
+    actuators: bool = True,
+    heading: bool = True,
+    parameters: dict[str, float] | None = None,
+    motors: Columns | None = None,
+    servos: Columns | None = None,
+) -> bytes:
+    """A log of PX4; `motors` and `servos` take the place of one propeller and one rudder, by their number."""
     t = (trial["t"] * 1e6).astype(np.uint64) + 1_000_000
     single = {name: values.astype(np.float32) for name, values in trial.items()}
     zero, psi = 0 * single["u"], (trial["psi"] + np.pi) % (2 * np.pi) - np.pi
@@ -68,32 +66,49 @@ def px4(trial: Columns, *, actuators: bool = True, heading: bool = True) -> byte
         "vehicle_attitude_setpoint": {"timestamp": t, "yaw_body": psi.astype(np.float32)},
     }
     if actuators:
-        motors, servos = np.c_[trial["n"] / 1000, unused], np.c_[trial["rudder"] / 0.7, unused]
-        topics["actuator_motors"] = {"timestamp": t, "control": motors.astype(np.float32)}
-        topics["actuator_servos"] = {"timestamp": t, "control": servos.astype(np.float32)}
-        topics["actuator_outputs"] = {"timestamp": t, "output": np.c_[1500 + 400 * motors].astype(np.float32)}
-    return ulog(topics)
+        pushed = np.column_stack([*({"1": trial["n"] / 1000} if motors is None else motors).values(), unused])
+        turned = np.column_stack([*({"1": trial["rudder"] / 0.7} if servos is None else servos).values(), unused])
+        topics["actuator_motors"] = {"timestamp": t, "control": pushed.astype(np.float32)}
+        topics["actuator_servos"] = {"timestamp": t, "control": turned.astype(np.float32)}
+        topics["actuator_outputs"] = {"timestamp": t, "output": np.c_[1500 + 400 * pushed].astype(np.float32)}
+    return ulog(topics, parameters=parameters)
 
 
-def ardupilot(trial: Columns) -> bytes:
+def ardupilot(
+    trial: Columns,
+    parameters: dict[str, float] | None = None,
+    outputs: dict[int, np.ndarray] | None = None,
+    changed: tuple[tuple[float, str, float], ...] = (),
+) -> bytes:
+    """A log of ArduPilot; `outputs` are pulses by channel, `changed` are parameters that change: time [s], name, value."""
+    if outputs is None:
+        outputs = {1: 1500 + 500 * trial["rudder"], 3: 1500 + 0.3 * trial["n"]}
+    messages = {"RCOU": range(1, min(max(outputs), 14) + 1), "RCO2": range(15, max(outputs) + 1)}
     log = DataFlash()
+    if parameters is not None:
+        log.parameters(parameters)
     log.define("ATT", "QccC", "TimeUS,Roll,Pitch,Yaw")
     log.define("GPS", "QBBIHLLff", "TimeUS,I,Status,GMS,GWk,Lat,Lng,Spd,GCrs")
     log.define("XKF1", "QBCffff", "TimeUS,C,Yaw,VN,VE,PN,PE")
     log.define("IMU", "QBfff", "TimeUS,I,GyrX,GyrY,GyrZ")
-    log.define("RCOU", "QHHH", "TimeUS,C1,C2,C3")
+    for name, channels in messages.items():
+        log.define(name, "Q" + "H" * len(channels), ",".join(["TimeUS", *(f"C{k}" for k in channels)]))
     for name in ("XKF1", "IMU", "GPS"):
         log.units(name, "s#---")
     rows: list[tuple[Any, ...]] = []
     for k, t in enumerate((trial["t"] * 1e6).astype(int).tolist()):
         one = {name: float(values[k]) for name, values in trial.items()}
         yaw = int(np.degrees(one["psi"]) % 360 * 100)
-        rows += [("ATT", t, 0, 0, yaw), ("RCOU", t, int(1500 + 500 * one["rudder"]), 0, int(1500 + 0.3 * one["n"]))]
+        rows.append(("ATT", t, 0, 0, yaw))
+        for name, channels in messages.items():
+            if channels:
+                rows.append((name, t, *(int(outputs[one][k]) if one in outputs else 0 for one in channels)))
         rows += [("XKF1", t, core, yaw, one["vn"], one["ve"], one["N"], one["E"]) for core in (0, 1)]
         rows.append(("IMU", t, 0, 0.0, 0.0, one["r"]))
         if k % 2 == 0:
             place = (int(one["lat"] * 1e7), int(one["lon"] * 1e7))
             rows.append(("GPS", t, 0, 3, 345_600_000 + t // 1000, 2300, *place, np.hypot(one["vn"], one["ve"]), 0.0))
+    rows += [("PARM", int(at * 1e6), name.encode(), value, 0.0) for at, name, value in changed]
     log.table(rows)
     return log.content
 

@@ -30,9 +30,29 @@ _ULOG = {"f4": "float", "f8": "double", "u8": "uint64_t", "i4": "int32_t", "u4":
          "i2": "int16_t", "u1": "uint8_t", "i1": "int8_t", "b1": "bool"}  # fmt: skip
 
 
-def ulog(topics: dict[str, dict[str, Any]], *, instances: dict[str, int] | None = None) -> bytes:
-    """A ULog of topics with columns; ``timestamp`` is in whole microseconds, matrices are arrays of a message."""
+def ulog_parameter(name: str, value: float) -> bytes:
+    """The message of a parameter: whole numbers are integers of 32 bits, others floats, as PX4 has them."""
+    kind, packed = (
+        ("int32_t", struct.pack("<i", value)) if isinstance(value, int) else ("float", struct.pack("<f", value))
+    )
+    key = f"{kind} {name}".encode()
+    return ulog_message("P", bytes([len(key)]) + key + packed)
+
+
+def ulog(
+    topics: dict[str, dict[str, Any]],
+    *,
+    instances: dict[str, int] | None = None,
+    parameters: dict[str, float] | None = None,
+    changed: tuple[tuple[int, str, float], ...] = (),
+) -> bytes:
+    """A ULog of topics with columns; ``timestamp`` is in whole microseconds, matrices are arrays of a message.
+
+    `parameters` stand in the header, `changed` (time [us], name, value) among the data.
+    """
     content = ulog_header()
+    for name, value in (parameters or {}).items():
+        content += ulog_parameter(name, value)
     rows = []
     for number, (name, columns) in enumerate(topics.items()):
         arrays = {path: np.asarray(values) for path, values in columns.items()}
@@ -48,9 +68,9 @@ def ulog(topics: dict[str, dict[str, Any]], *, instances: dict[str, int] | None 
         rows += [(int(row["timestamp"]), number, row.tobytes()) for row in table]
     for number, name in enumerate(topics):
         content += ulog_message("A", struct.pack("<BH", (instances or {}).get(name, 0), number) + name.encode())
-    for _, number, data in sorted(rows, key=lambda one: one[0]):
-        content += ulog_message("D", struct.pack("<H", number) + data)
-    return content
+    messages = [(time, ulog_message("D", struct.pack("<H", number) + data)) for time, number, data in rows]
+    messages += [(time, ulog_parameter(name, value)) for time, name, value in changed]
+    return content + b"".join(data for _, data in sorted(messages, key=lambda one: one[0]))
 
 
 _PACK = {"b": "b", "B": "B", "M": "B", "h": "h", "H": "H", "i": "i", "I": "I", "q": "q", "Q": "Q", "f": "f", "d": "d",
@@ -82,6 +102,13 @@ class DataFlash:
     def add(self, name: str, *values: Any) -> None:
         number, letters = self._types[name]
         self.content += bytes([0xA3, 0x95, number]) + struct.pack("<" + "".join(_PACK[one] for one in letters), *values)
+
+    def parameters(self, values: dict[str, float], time_us: int = 0) -> None:
+        """State parameters as a log does at its start, or where one is changed."""
+        if "PARM" not in self._types:
+            self.define("PARM", "QNff", "TimeUS,Name,Value,Default")
+        for name, value in values.items():
+            self.add("PARM", time_us, name.encode(), value, 0.0)
 
     def table(self, rows: list[tuple[Any, ...]]) -> None:
         """Add messages in order of their times: name, time [us], values."""

@@ -6,10 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import zstandard
 from pymavlink import DFReader
 
 from ferryid.errors import FerryIdError
 from ferryid.ingest import open_log
+from ferryid.ingest.join import join
+from ferryid.ingest.parameters import parameters_of
 from tests.ingest.autopilot_logs import DataFlash
 
 N = 40
@@ -115,3 +118,43 @@ def test_it_is_known_by_its_content_whatever_its_name(tmp_path: Path) -> None:
     assert len(open_log(written(tmp_path, boat().content, "log")).topics) == 5
     with pytest.raises(FerryIdError, match="not a log of a supported format"):
         open_log(written(tmp_path, b"\0\1\2\3" * 40, "firmware.bin"))
+
+
+def test_parameters_are_read_with_the_times_at_which_they_were_set(tmp_path: Path) -> None:
+    log = boat()
+    log.add("PARM", 1_500_000, b"SERVO1_MIN", 1150.0)
+    log.add("PARM", 1_500_001, b"MOT_VEC_ANGLEMAX", 30.5)
+    path = written(tmp_path, log.content)
+    found = parameters_of(open_log(path))
+    assert set(found) == {"SERVO1_MIN", "MOT_VEC_ANGLEMAX"}
+    assert found["SERVO1_MIN"].values.tolist() == [1100.0, 1150.0]
+    assert found["MOT_VEC_ANGLEMAX"].values.tolist() == [30.5]
+    # On the clock of the topics, which is UTC here.
+    attitude = next(topic.start_ns for topic in open_log(path).topics if topic.name == "/ATT")
+    assert attitude is not None
+    assert (found["SERVO1_MIN"].time_ns - attitude).tolist() == [-999_100_000, 500_000_000]
+    # Of a compressed log, and of two parts of one recording, they are the same and one after another.
+    (tmp_path / "a.bin.zst").write_bytes(zstandard.compress(log.content))
+    assert parameters_of(open_log(tmp_path / "a.bin.zst"))["SERVO1_MIN"].values.tolist() == [1100.0, 1150.0]
+    later = DataFlash()
+    later.define("ATT", "QccC", "TimeUS,Roll,Pitch,Yaw")
+    later.parameters({"SERVO1_MIN": 1200.0}, 9_000_000)
+    later.add("ATT", 9_000_001, 0, 0, 1)
+    both = join([open_log(written(tmp_path, later.content, "b.bin")), open_log(path)])
+    # The part without a receiver counts from the start-up, and so comes first.
+    assert parameters_of(both)["SERVO1_MIN"].values.tolist() == [1200.0, 1100.0, 1150.0]
+
+
+def test_a_log_that_is_cut_while_its_parameters_are_read(tmp_path: Path) -> None:
+    path = written(tmp_path, boat().content)
+    reader = open_log(path)
+    path.write_bytes(path.read_bytes()[:400])
+    with pytest.raises(FerryIdError, match="became shorter while it was read"):
+        parameters_of(reader)
+
+
+def test_parameters_without_a_number_are_left_out(tmp_path: Path) -> None:
+    log = boat()
+    log.add("PARM", 1_500_000, b"SERVO2_MIN", float("nan"))
+    log.add("PARM", 1_500_000, b"", 3.0)
+    assert set(parameters_of(open_log(written(tmp_path, log.content)))) == {"SERVO1_MIN"}

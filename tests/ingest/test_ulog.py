@@ -11,6 +11,7 @@ from pyulog import ULog
 
 from ferryid.errors import FerryIdError
 from ferryid.ingest import open_log
+from ferryid.ingest.parameters import parameters_of
 from tests.ingest.autopilot_logs import (
     MAGIC,
     SYNC,
@@ -158,3 +159,22 @@ def test_it_is_known_by_its_content_whatever_its_name(tmp_path: Path) -> None:
     assert len(open_log(written(tmp_path, ulog(TOPICS), "log.csv")).topics) == 3
     with pytest.raises(FerryIdError, match="not a log of a supported format"):
         open_log(written(tmp_path, b"PK\x03\x04 something else", "log.ulg"))
+
+
+def test_parameters_have_the_time_of_the_data_before_them(tmp_path: Path) -> None:
+    stated = {"CA_ROTOR_COUNT": 2, "CA_ROTOR0_PX": -1.25}
+    log = ulog(TOPICS, parameters=stated, changed=((int(T[20]) + 10, "CA_ROTOR0_PX", -1.5),))
+    path = tmp_path / "a.ulg"
+    path.write_bytes(log)
+    reader = open_log(path)
+    found = parameters_of(reader)
+    assert {name: one.values.tolist() for name, one in found.items()} == {
+        "CA_ROTOR_COUNT": [2.0],
+        "CA_ROTOR0_PX": [-1.25, -1.5],
+    }
+    times = reader.read({"/vehicle_gps_position": ()})["/vehicle_gps_position"].receive_ns
+    start = min(topic.start_ns for topic in reader.topics if topic.start_ns is not None)
+    assert found["CA_ROTOR0_PX"].time_ns.tolist() == [start, int(times[20])]
+    expected = ULog(str(path))
+    assert {name: one.values[0] for name, one in found.items()} == expected.initial_parameters
+    assert not parameters_of(open_log(Path("fixtures/short.mcap")))
