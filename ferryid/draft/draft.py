@@ -122,7 +122,8 @@ def draft_profile(log: str | Path, like: Profile | None = None, ranges: TimeRang
     if not actuators:
         raise FerryIdError(
             f"{log}: no field looks like an actuator's speed, angle, force or order, found the topics "
-            f"{_listed([one.name for one in topics])}. Fix: record the orders, or write the signal map by hand"
+            f"{_listed([one.name for one in topics])}{''.join(f'; {one}' for one in driven.remarks)}. Fix: record the orders, "
+            "or write the signal map by hand"
         )
     wind = wind_signal(winds, samples, motion)
     every = [*signals, *([] if wind is None else [wind]), *_tau_d(topics)]

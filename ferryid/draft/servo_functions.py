@@ -89,11 +89,11 @@ def configured_outputs(
     chosen: dict[int, tuple[_Output, int]] = {}
     for function in sorted(driven, key=lambda one: (one == _STEERING, one)):
         same = [one for one in outputs if one.function == function]
-        live = [one for one in same if one.moves]
+        live = [one for one in same if one.moves or _steady_us(one, values, samples)]
         remarks += [
             f"{one.stated}, but {one.field.path} of {one.field.topic} never changes: it is not mapped"
             for one in same
-            if not one.moves
+            if one not in live
         ]
         if live:
             chosen[function] = (live[0], len(live))
@@ -130,6 +130,16 @@ def _moves(field: ActuatorField, samples: Samples) -> bool:
         return False
     pulses = samples.raw(field.stream, field.path)
     return bool(np.unique(pulses[np.isfinite(pulses) & (pulses > 0.0)]).size > 1)
+
+
+def _steady_us(output: _Output, values: UsedValues, samples: Samples) -> float:
+    """Return the one pulse that an output sends all the time [us], 0 where that is its neutral, and where it changes."""
+    if output.moves or (output.field.stream, output.field.path) not in samples.columns:
+        return 0.0
+    pulses = samples.raw(output.field.stream, output.field.path)
+    pulses = pulses[np.isfinite(pulses) & (pulses > 0.0)]
+    neutral = values.get(f"SERVO{output.number}_TRIM")
+    return 0.0 if neutral is None or not pulses.size or pulses[0] == neutral else float(pulses[0])
 
 
 def _frame(values: UsedValues) -> list[str]:
@@ -208,6 +218,15 @@ def _steering(output: _Output, values: UsedValues, samples: Samples) -> list[Act
 
 def _setting(output: _Output, values: UsedValues, samples: Samples, *, thruster: bool) -> OutputSetting:
     """Return pulses and sign of an output that goes both ways from its neutral, as all of a boat's do."""
+    setting = _limits(output, values, samples, thruster=thruster)
+    if steady_us := _steady_us(output, values, samples):
+        doubt = f"{output.field.path} is {steady_us:g} us throughout: how it acts does not show in this log"
+        setting = replace(setting, doubts=(*setting.doubts, doubt))
+    return setting
+
+
+def _limits(output: _Output, values: UsedValues, samples: Samples, *, thruster: bool) -> OutputSetting:
+    """Return pulses and sign as the parameters state them, and how these contradict the log and each other."""
     servo = f"SERVO{output.number}"
     names = tuple(f"{servo}_{end}" for end in ("MIN", "TRIM", "MAX"))
     stated = [values.get(name) for name in names]

@@ -403,7 +403,9 @@ def _signal(signal: MappedSignal, answers: Answers) -> list[str]:
         lines.append(f"unit = {_text(signal.unit)}")
     if signal.pulse_us is not None:
         *pulses, dead = (f"{value:g}" for value in signal.pulse_us)
-        lines.append(f"pulse_us = [{', '.join(pulses)}]    # full astern, neutral, full ahead")
+        turned = signal.quantity.removesuffix(".command").endswith((".rudder", ".angle"))
+        meaning = "full travel to one side, neutral, to the other" if turned else "full astern, neutral, full ahead"
+        lines.append(f"pulse_us = [{', '.join(pulses)}]    # {meaning}")
         lines += [f"dead_band_us = {dead}"] if dead != "0" else []
     elif signal.unit == "us":
         lines.append(

@@ -10,6 +10,7 @@ import pytest
 
 from ferryid.draft import Answers, Draft, draft_profile, draft_text, questions
 from ferryid.draft.write import as_json, as_text
+from ferryid.errors import FerryIdError
 from ferryid.signals.recording import record
 from ferryid.types import Floats
 from ferryid.vessel import parse_profile
@@ -77,7 +78,10 @@ def test_a_propeller_and_a_rudder_are_what_their_functions_state(trial: Columns,
         f"pulse_us = [1100, 1500, 1900]    # full astern, neutral, full ahead\ndead_band_us = 40\nfull_rpm = 1000{sign}"
         in text
     )
-    assert f"pulse_us = [1200, 1480, 1800]    # full astern, neutral, full ahead\nfull_deg = 35{sign}" in text
+    assert (
+        f"pulse_us = [1200, 1480, 1800]    # full travel to one side, neutral, to the other\nfull_deg = 35{sign}"
+        in text
+    )
     assert "# SERVO3_FUNCTION = 70 (Throttle).\n" in text
     assert f"# SERVO1_MIN = 1200, SERVO1_TRIM = 1480, SERVO1_MAX = 1800, SERVO1_REVERSED = {int(reverse)}.\n" in text
     columns = columns_of(tmp_path, draft)
@@ -224,6 +228,19 @@ def test_of_a_parameter_that_changes_the_value_that_held_longest_is_used(trial: 
     (tmp_path / "boat.bin").write_bytes(early)
     first = draft_profile(tmp_path / "boat.bin", ranges=((0.0, 11.0),))
     assert any("1450 held longest" in remark for remark in first.remarks)
+
+
+def test_a_thruster_at_one_speed_is_kept_and_one_at_rest_is_not(trial: Columns, tmp_path: Path) -> None:
+    stated = BOAT | RUDDER | PROPELLER
+    outputs = both(trial, stated)
+    draft = drafted(tmp_path, ardupilot(trial, stated, outputs | {3: np.full(len(trial["t"]), 1700.0)}))
+    assert [one.kind for one in draft.actuators] == ["propeller_rudder"]
+    assert "C3 is 1700 us throughout: how it acts does not show in this log" in doubts(draft)
+    np.testing.assert_allclose(columns_of(tmp_path, draft)["n_cmd_propeller"], 500.0)
+    (tmp_path / "boat.bin").write_bytes(ardupilot(trial, stated, outputs | {3: np.full(len(trial["t"]), 1500.0)}))
+    told = r"no field looks like an actuator.*SERVO3_FUNCTION = 70 \(Throttle\), but C3 of /RCOU never changes.*Fix: record"
+    with pytest.raises(FerryIdError, match=told):
+        draft_profile(tmp_path / "boat.bin")
 
 
 def test_outputs_beyond_the_fourteenth(trial: Columns, tmp_path: Path) -> None:
