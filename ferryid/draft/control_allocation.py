@@ -17,8 +17,6 @@ _FIXED = {5: "Rover (Ackermann)", 6: "Rover (Differential)", 13: "Rover (Mecanum
 """CA_AIRFRAME of vehicles whose places of motors PX4 does not ask for: what stands in the parameters means nothing."""
 _RUDDERS = {4: "Rudder", 16: "Steering Wheel"}
 """CA_SV_CSn_TYPE of what steers."""
-_ASIDE_DEG = 1.0
-"""A direction this near to starboard is one to starboard [deg]."""
 
 
 def rudders_alone(fields: Sequence[ActuatorField], values: UsedValues) -> list[ActuatorField]:
@@ -90,12 +88,13 @@ def _placement(rotor: int, values: UsedValues) -> Placement | None:
         flat = hypot(ahead, aside)
         shown = f"CA_ROTOR{rotor}_AX = {ahead:.4g}, _AY = {aside:.4g}, _AZ = {down:.4g}"
         if flat > abs(down):
-            angle = degrees(atan2(aside, ahead))
-            tunnel = abs(angle - 90.0) < _ASIDE_DEG
+            # Parameters have two decimals.
+            angle = round(degrees(atan2(aside, ahead)), 1)
+            tunnel = angle == 90.0
             placement = replace(
                 placement,
                 kind="tunnel" if tunnel else "",
-                angle_deg=None if tunnel else round(angle, 1),
+                angle_deg=None if tunnel else angle,
                 evidence=(*placement.evidence, shown),
             )
         elif placement.position_m is not None:

@@ -66,6 +66,7 @@ def render(
         where_common=diagnosis_words.where_common(diagnoses, common),
         common=[_finding(one, f"all-finding-{k}", False, ()) for k, one in enumerate(common, 1)],
         likeness=of_all,
+        heat_maps=any(one.get("figures") for one in (of_all, *(log["likeness"] for log in logs))),
         sign=diagnosis_words.SIGN,
         made=made,
         gathered=gathered,

@@ -9,6 +9,7 @@ from jinja2 import Environment, PackageLoader, Template
 
 from ferryid.counts import counted
 from ferryid.errors import printable
+from ferryid.report.heat_map import inline
 
 
 @cache
@@ -22,6 +23,7 @@ def template(name: str) -> Template:
         finalize=_visible,
     )
     environment.globals["counted"] = counted
+    environment.globals["heat_inline"] = inline()
     return environment.get_template(name)
 
 

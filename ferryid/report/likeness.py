@@ -10,6 +10,7 @@ from ferryid.counts import counted
 from ferryid.diagnose import Likeness, Pair, separation
 from ferryid.effects.wording import listed
 from ferryid.report.figures import MEASURED, STYLE, WIDTH, margins, svg_text
+from ferryid.report.heat_map import HeatCell, HeatMap
 
 CELL, NAMES, BAR = 0.27, 2.9, 0.7
 """Inches of a cell at most, of the names beside the map, and of the scale with its label."""
@@ -59,6 +60,37 @@ def heat_map(likeness: Likeness) -> str:
         return svg_text(figure)
 
 
+def heat_cells(likeness: Likeness) -> HeatMap:
+    """Return the same for the page's script: each cell has the two effects, and from which size on they are distinguished."""
+    effects, pairs = likeness.effects, {frozenset((one.first, one.second)): one for one in likeness.pairs}
+
+    def cell(i: int, j: int) -> HeatCell:
+        value, one = float(likeness.matrix[i, j]), effects[i]
+        fill = round(100.0 * value)
+        if i == j:
+            size = f"{one.title}: signal-to-noise ratio {_size(one.signal_to_noise)} at its usual size"
+            return HeatCell(fill, f"{size}{'' if one.visible else ', too little to be named'}.")
+        pair = pairs.get(frozenset((one.key, effects[j].key)))
+        apart = "" if pair is None else f" Distinguished {_from(pair)}."
+        says = f"{one.title} and {_inline(effects[j].title)}: likeness {_number(value)}.{apart}"
+        text = f"{min(value, 0.99):.2f}".lstrip("0") if value >= WRITTEN else ""
+        return HeatCell(fill, says, text, on_dark=value > DARK)
+
+    places = range(len(effects))
+    return HeatMap(
+        "likeness of every two effects",
+        "number of the effect",
+        "",
+        [str(k + 1) for k in places],
+        [f"{k} {one.title} · {_size(one.signal_to_noise)} σ" for k, one in enumerate(effects, 1)],
+        [[cell(i, j) for j in places] for i in places],
+        ["var(--card)", "var(--new)"],
+        ["0", "0.5", "1"],
+        "likeness",
+        [k for k in places if not effects[k].visible],
+    )
+
+
 def section(likeness: Likeness | None, file: str, where: str, *, drawn: bool = True) -> dict[str, Any]:
     """Return what a page shows of it; empty where no two effects can be compared.
 
@@ -74,7 +106,9 @@ def section(likeness: Likeness | None, file: str, where: str, *, drawn: bool = T
     return {
         "says": sentences(likeness, where),
         "rows": [_row(likeness, one) for one in likeness.alike],
-        "figures": [{"file": file, "svg": heat_map(likeness), "caption": caption}] if drawn else [],
+        "figures": [{"file": file, "svg": heat_map(likeness), "heat": heat_cells(likeness).plain(), "caption": caption}]
+        if drawn
+        else [],
     }
 
 
@@ -140,7 +174,18 @@ def _row(likeness: Likeness, pair: Pair) -> dict[str, str]:
 
 
 def _value(pair: Pair) -> str:
-    return f"{pair.likeness:.2f}" if pair.likeness < 0.995 else "above 0.99"
+    return _number(pair.likeness)
+
+
+def _number(likeness: float) -> str:
+    return f"{likeness:.2f}" if likeness < 0.995 else "above 0.99"
+
+
+def _from(pair: Pair) -> str:
+    """Return from which size on two effects are distinguished, for a sentence."""
+    return (
+        f"{'' if pair.resolved_from is None else 'from '}{resolved(pair)}{'' if pair.resolved_from is None else ' on'}"
+    )
 
 
 def _inline(title: str) -> str:

@@ -11,7 +11,7 @@ from ferryid.report.folder import PAGE, made, write_folder
 from ferryid.report.html import template
 from ferryid.report.interactive import STATIC, Interactive, make_interactive
 from ferryid.report.outcome import Report
-from ferryid.report.sweep_figures import curves, heat_map
+from ferryid.report.sweep_figures import curves, heat_cells, heat_map
 from ferryid.report.sweep_text import headline, render_sweep
 from ferryid.report.sweep_timeline import sweep_timeline
 from ferryid.report.timeline import Timeline
@@ -88,6 +88,7 @@ def render(found: Sweep, command: Sequence[str] = (), interactive: Interactive =
                 "folds": choice.curves.folds,
                 "rows": choice.curves.rows,
                 "svg": drawings[name],
+                "heat": heat_cells(found, choice).plain() if len(found.windows_s) > 1 else None,
                 "timeline": interactive.number(place),
                 "choice": {"window_s": f"{choice.window_s:g}", "components": choice.components},
                 "table": _rows(found, key),

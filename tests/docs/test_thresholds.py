@@ -36,6 +36,8 @@ NO_DECISION = {
     """,
     "indices, labels, exponents and neutral values": """
         signals.smooth _AXIS_OF
+        draft.servo_functions _STEERING _THROTTLE _LEFT _RIGHT _BOAT _RELAY
+        draft.actuators USUAL_PULSES_US
         diagnose.checks.kinematics SCALE ANGLE X Y LATE NORTH EAST NEUTRAL
         diagnose.checks.yaw_rate_scale NEUTRAL SIZE
         diagnose.data.measurements CHANNELS

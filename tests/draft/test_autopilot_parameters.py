@@ -118,6 +118,7 @@ def test_a_thruster_that_is_turned_is_an_azimuth(trial: Columns, tmp_path: Path)
     angle = next(one for one in draft.every if one.quantity == "propeller.angle.command")
     # Pulses above neutral turn to starboard, so that the thruster at the stern pushes to port.
     assert (angle.sign, angle.full_deg) == (-1.0, 30.0)
+    assert "states the other sign" not in doubts(draft)
     assert "MOT_VEC_ANGLEMAX = 30 deg: it turns the thruster" in angle.evidence
     assert not any(one.key == "propeller.full_deg" for one in questions(draft))
     expected = -np.radians(30.0) * trial["rudder"] / 0.7

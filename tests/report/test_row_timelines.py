@@ -44,7 +44,7 @@ def ends(trace: Trace) -> Floats:
 def sweep(*windows_s: float) -> tuple[Sweep, Selection]:
     """Return a sweep of 4 components in which the base model makes no error in yaw."""
     mse = 10.0 + np.arange(len(windows_s) * 12.0).reshape(len(windows_s), 4, 3)
-    curves = Curves(mse, 0.1 * mse, np.array([20.0, 40.0, 0.0]), 5, 100, np.stack([mse] * 5))
+    curves = Curves(mse, 0.1 * mse, np.array([20.0, 40.0, 0.0]), 5, 100, np.stack([mse] * 5, axis=1))
     choice = Selection(0, windows_s[0], 2, np.zeros(3, dtype=bool), curves)
     what = "both" if len(windows_s) > 1 else "components"
     return Sweep(what, "ferry", (), FitSettings(), windows_s, {"blocks": choice}, ()), choice
