@@ -67,7 +67,9 @@ def drafted_actuators(
                 signal = replace(signal, sign=field.setting.sign)
             signals.append(signal)
         placement = (placements or {}).get(name, NOT_STATED)
-        found.append(DraftedActuator(name, placement.kind or kinds[name], tuple(signals), placement))
+        # What has an angle or a rudder does not push to one side alone.
+        kind = placement.kind if placement.kind and kinds[name] == "propeller" else kinds[name]
+        found.append(DraftedActuator(name, kind, tuple(signals), placement))
     return found
 
 

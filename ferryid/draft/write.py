@@ -39,6 +39,8 @@ _AREAS = (
     ("lateral_m2", "Area above water seen from the side [m²]", "5.0"),
 )
 """What a wind acts on: key, question and hint."""
+_STATED = re.compile(r"(SERVO[0-9]+_FUNCTION|CA_SV_CS[0-9]+_TYPE) = ")
+"""Evidence that a parameter of an autopilot names what a signal drives."""
 _ANY_SIGN = ("x_m", "y_m")
 """Ends of keys whose answer may be negative or zero."""
 
@@ -130,7 +132,8 @@ def as_text(draft: Draft, file: str, text: str) -> str:
     wide = max(len(one.quantity) for one in draft.every)
     lines = [f"{file}: {counted(len(draft.every), 'signal')}, {counted(len(draft.actuators), 'actuator')}"]
     for one in draft.every:
-        how = ", ".join(filter(None, [one.unit, one.frame, "sign -1" if one.sign < 0.0 else ""]))
+        stated = next((shown for shown in one.evidence if _STATED.match(shown)), "")
+        how = ", ".join(filter(None, [one.unit, one.frame, "sign -1" if one.sign < 0.0 else "", stated]))
         lines.append(f"  {one.quantity:<{wide}}  {stream_name(one.topic, one.where)}: {', '.join(one.fields)}  [{how}]")
         lines += [f"  {'':<{wide}}    check: {doubt}" for doubt in one.doubts]
     for actuator in draft.actuators:

@@ -83,6 +83,7 @@ def test_a_propeller_and_a_rudder_are_what_their_functions_state(trial: Columns,
         in text
     )
     assert "# SERVO3_FUNCTION = 70 (Throttle).\n" in text
+    assert re.search(r"/RCOU: C3  \[us, .*SERVO3_FUNCTION = 70 \(Throttle\)\]", as_text(draft, "boat.toml", text))
     assert f"# SERVO1_MIN = 1200, SERVO1_TRIM = 1480, SERVO1_MAX = 1800, SERVO1_REVERSED = {int(reverse)}.\n" in text
     columns = columns_of(tmp_path, draft)
     np.testing.assert_allclose(columns["n_cmd_propeller"], trial["n"], atol=1000.0 / 360.0)
@@ -300,6 +301,16 @@ def test_rotors_of_px4_that_contradict_the_log(
     draft = drafted(tmp_path, px4(trial, parameters=stated | changes, motors=orders, servos={}), "boat.ulg")
     assert told in doubts(draft)
     assert told in text_of(draft)
+
+
+def test_a_motor_of_px4_that_a_servo_turns_is_no_tunnel_thruster(trial: Columns, tmp_path: Path) -> None:
+    stated: dict[str, float] = {"CA_AIRFRAME": 9, "CA_ROTOR_COUNT": 2, "CA_SV_CS_COUNT": 0}
+    for k, axis in enumerate(((0.0, 1.0, 0.0), (1.0, 0.0, 0.0))):
+        stated |= {f"CA_ROTOR{k}_A{letter}": value for letter, value in zip("XYZ", axis, strict=True)}
+    motors, servos = {"1": trial["n"] / 1e3, "2": trial["n"] / 2e3}, {"1": trial["rudder"], "2": -trial["rudder"]}
+    draft = drafted(tmp_path, px4(trial, parameters=stated, motors=motors, servos=servos), "boat.ulg")
+    assert [one.kind for one in draft.actuators] == ["azimuth", "azimuth"]
+    parse_profile(text_of(draft), "boat.toml")
 
 
 def test_the_servo_of_px4_that_is_a_rudder(trial: Columns, tmp_path: Path) -> None:

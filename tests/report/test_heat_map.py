@@ -30,9 +30,9 @@ SAYS = "document.querySelector('.heat-map .says').textContent"
 AT = "[...document.querySelectorAll('.heat-map .at')].map((one) => one.textContent)"
 
 
-def write(folder: Path, *, scripts: bool = True) -> Path:
-    """Write the page of a sweep of two windows and four components."""
-    found, choice = sweep(0.5, 2.0)
+def write(folder: Path, *windows_s: float, scripts: bool = True) -> Path:
+    """Write the page of a sweep of windows and four components."""
+    found, choice = sweep(*windows_s)
     interactive = STATIC
     if scripts and available():
         interactive = make_interactive({0: sweep_timeline(found, choice)}, folder / "reports" / "a", folder)
@@ -45,7 +45,7 @@ def write(folder: Path, *, scripts: bool = True) -> Path:
 
 @pytest.fixture(scope="module")
 def trial(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write(tmp_path_factory.mktemp("sweep"))
+    return write(tmp_path_factory.mktemp("sweep"), 0.5, 2.0)
 
 
 @pytest.fixture
@@ -164,7 +164,7 @@ def test_paper_has_the_static_map_and_a_page_alone_the_other_one(
     page: Page, trial: Path, tmp_path: Path, *, scripts: bool
 ) -> None:
     page.faults.clear()
-    place = trial if scripts else write(tmp_path / "plain", scripts=False)
+    place = trial if scripts else write(tmp_path / "plain", 0.5, 2.0, scripts=False)
     page.open(place)
     static = "document.querySelector('.heat svg').getBoundingClientRect().width > 0"
     shown = "document.querySelector('.heat-map').getBoundingClientRect().width > 0"
@@ -190,8 +190,8 @@ def test_paper_has_the_static_map_and_a_page_alone_the_other_one(
 @needs_chromium
 @pytest.mark.slow
 @pytest.mark.parametrize("width", [360, 1400])
-def test_a_heat_map_is_no_wider_than_the_window(opened: Page, trial: Path, width: int) -> None:
-    opened.open(trial, width)
+def test_a_heat_map_is_no_wider_than_the_window(opened: Page, tmp_path: Path, width: int) -> None:
+    opened.open(write(tmp_path, *(0.25 * k for k in range(1, 13))), width)
     assert opened.do("document.documentElement.scrollWidth") <= width
 
 
