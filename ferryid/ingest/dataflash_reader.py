@@ -103,7 +103,7 @@ def open_dataflash(path: Path, layout: TableLayout | None) -> RecordReader:
         encoding="dataflash",
         since_ns=since_ns or 0,
         note=note,
-        parameters=partial(_parameters, scan),
+        parameters=partial(_parameters, _parameter_tables(scan)),
     )
 
 
@@ -203,14 +203,21 @@ def _whole(layout: _Layout, places: NDArray[np.int64]) -> RecordTable | None:
     return RecordTable(instance_name(layout.name, 0), layout.name, fields, places, clock, _TIMES[clock])
 
 
-def _parameters(scan: _Scan, data: NDArray[np.uint8], since_ns: int) -> dict[str, Parameter]:
-    """Return the parameters that the messages PARM state."""
+def _parameter_tables(scan: _Scan) -> list[RecordTable]:
+    """Return the messages PARM, which state a parameter each."""
     found = []
     for number, layout in scan.layouts.items():
         places = np.asarray(scan.places.get(number, ()), np.int64)
         table = _whole(layout, places) if layout.name == "PARM" and len(places) else None
-        if table is None or not {"Name", "Value"} <= table.fields.keys() or table.fields["Value"].dtype.kind == "S":
-            continue
+        if table is not None and {"Name", "Value"} <= table.fields.keys() and table.fields["Value"].dtype.kind != "S":
+            found.append(table)
+    return found
+
+
+def _parameters(tables: list[RecordTable], data: NDArray[np.uint8], since_ns: int) -> dict[str, Parameter]:
+    """Return the parameters that messages state."""
+    found = []
+    for table in tables:
         times, good = times_of(data, table, table.time, since_ns)
         names, values = column_of(data, table, "Name"), np.asarray(column_of(data, table, "Value"), np.float64)
         found.append(gathered([str(one) for one in names[good]], times[good], values[good]))

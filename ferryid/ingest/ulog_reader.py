@@ -101,13 +101,15 @@ def open_ulog(path: Path, layout: TableLayout | None) -> RecordReader:
         encoding="ulog",
         since_ns=since_ns or 0,
         note=note,
-        parameters=partial(_parameters, scan, tables),
+        parameters=partial(_parameters, scan.parameters, tables),
     )
 
 
-def _parameters(scan: _Scan, tables: list[RecordTable], data: NDArray[np.uint8], since_ns: int) -> dict[str, Parameter]:
+def _parameters(
+    stated: list[tuple[int, str, float]], tables: list[RecordTable], data: NDArray[np.uint8], since_ns: int
+) -> dict[str, Parameter]:
     """Return the parameters of the log; a value has no time of its own, but that of the data before it."""
-    if not scan.parameters:
+    if not stated:
         return {}
     before = []
     for table in tables:
@@ -116,10 +118,10 @@ def _parameters(scan: _Scan, tables: list[RecordTable], data: NDArray[np.uint8],
     rows = np.concatenate(before)
     rows = rows[np.argsort(rows[:, 0], kind="stable")]
     # What stands in the header holds from the first message on.
-    places = np.asarray([place for place, _, _ in scan.parameters], np.int64)
+    places = np.asarray([place for place, _, _ in stated], np.int64)
     times = rows[np.clip(np.searchsorted(rows[:, 0], places) - 1, 0, len(rows) - 1), 1] if len(rows) else 0 * places
-    values = np.asarray([value for _, _, value in scan.parameters], np.float64)
-    return gathered([name for _, name, _ in scan.parameters], times, values)
+    values = np.asarray([value for _, _, value in stated], np.float64)
+    return gathered([name for _, name, _ in stated], times, values)
 
 
 def _merged(tables: list[RecordTable]) -> list[RecordTable]:
