@@ -95,6 +95,7 @@ def open_dataflash(path: Path, layout: TableLayout | None) -> RecordReader:
     losses = damage_loss(path, "ArduPilot log", scan.stretches, scan.lost_bytes)
     if scan.cut:
         losses.append(Loss(str(path), "the ArduPilot log ends within a message: the end of the recording is missing"))
+    losses += _timeless(path, scan)
     return RecordReader(
         path,
         data,
@@ -201,6 +202,21 @@ def _whole(layout: _Layout, places: NDArray[np.int64]) -> RecordTable | None:
     if clock is None:
         return None
     return RecordTable(instance_name(layout.name, 0), layout.name, fields, places, clock, _TIMES[clock])
+
+
+def _timeless(path: Path, scan: _Scan) -> list[Loss]:
+    """Return the messages that cannot be placed in time, as a damaged label of their definition leaves them."""
+    return [
+        Loss(
+            str(path),
+            f"no field of its definition is a time ({' or '.join(_TIMES)}): {', '.join(layout.labels)}",
+            topic=instance_name(layout.name, 0),
+            messages=len(places),
+        )
+        for number, places in scan.places.items()
+        for layout in [scan.layouts[number]]
+        if places and layout.name not in _DEFINITIONS and _whole(layout, np.asarray(places, np.int64)) is None
+    ]
 
 
 def _parameter_tables(scan: _Scan) -> list[RecordTable]:
