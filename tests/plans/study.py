@@ -10,11 +10,15 @@ import numpy as np
 
 from ferryid.diagnose.data import read_measurements, window_lengths
 from ferryid.diagnose.inference import estimation_problem, fit, fitted_force_model, prior_force_model, windows
+from ferryid.diagnose.judging import Responses, likeness, together
 from ferryid.effects.force_model import hull_of
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.identifiability.sensors import mapped, reading
 from ferryid.identifiability.trial import sailing
 from ferryid.planning import PlanSettings, plan
+from ferryid.planning.information import information
+from ferryid.planning.limits import Limits
+from ferryid.planning.segments import segments
 from ferryid.planning.waters import Waters
 from ferryid.simulate import Scenario, write_log
 from ferryid.simulate.sensors import sense
@@ -39,12 +43,22 @@ class Found:
         Median error of the hull's coefficients after either trial, over their prior standard deviations.
     expected
         Median ratio of the deviations that the plan expected.
+    expected_median
+        Ratio of the median deviations that it expected, as the errors are compared; deviations in those of the prior.
+    pairs
+        Pairs of effects of usual size that a straight run leaves unresolved, as ``ferryid diagnose`` states them.
+    separated, separated_by_usual
+        How many of them are resolved beside that run by a trial that is planned after it, and by the usual one.
     """
 
     vessel: str
     usual: float
     planned: float
     expected: float
+    expected_median: float
+    pairs: int
+    separated: int
+    separated_by_usual: int
 
 
 def study(number: int) -> Found:
@@ -60,7 +74,32 @@ def study(number: int) -> Found:
         usual = _log(waters.twelve_corners(made.duration_s), profile, true, 2 * number + 1, folder / "usual.mcap")
         planned = _log(made.track.scenario, profile, true, 2 * number + 2, folder / "planned.mcap")
         errors = [_error(log, profile, true) for log in (usual, planned)]
-    return Found(profile.name, *errors, made.ratio)
+        deviations = np.array([(one.usual / one.now, one.planned / one.now) for one in made.hull])
+        medians = np.median(deviations, axis=0)
+        counts = _separated(profile, true, made.track.limits, made.duration_s, number, folder)
+    return Found(profile.name, *errors, made.ratio, float(medians[1] / medians[0]), *counts)
+
+
+def _separated(
+    profile: Profile, true: Profile, limits: Limits, seconds: float, number: int, folder: Path
+) -> tuple[int, int, int]:
+    """Return how many pairs a straight run leaves unresolved, and how many a planned and the usual trial after it resolve."""
+    seed = 2 * number + 1
+    waters = Waters(profile, sailing(profile), frozenset(), folder, seed)
+    straight = next(one for one in segments(limits, waters.scale[1]) if one.kind == "run")
+    run = _log(waters.following(straight.poses, limits), profile, true, seed, folder / "run.mcap")
+    made = plan(_seen(profile), (str(run),), PlanSettings(seed=seed), IN_MEMORY)
+    assert made.track is not None
+    planned = _log(made.track.scenario, profile, true, seed + 1, folder / "after.mcap")
+    usual = _log(waters.twelve_corners(seconds), profile, true, seed + 1, folder / "again.mcap")
+    known, *others = (information(str(log), _seen(profile), None) for log in (run, planned, usual))
+    left = {frozenset((one.first, one.second)) for one in likeness(together(known)).alike if not one.resolved}
+
+    def resolved(more: list[Responses]) -> int:
+        every = likeness(together([*known, *more])).pairs
+        return sum(one.resolved for one in every if frozenset((one.first, one.second)) in left)
+
+    return len(left), *map(resolved, others)
 
 
 def _off(vessel: Profile, rng: np.random.Generator) -> Profile:
