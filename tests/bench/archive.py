@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import statistics
 import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import fields, replace
 from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
-from distributed import LocalCluster
 
 from ferryid.identify import block_sum_store, window_store
 from ferryid.identify.block_sum_store import StoredSums, load_block_sums
@@ -29,16 +30,21 @@ from ferryid.signals.prepare import open_track
 from ferryid.simulate import load_scenario, simulate, write_log
 from ferryid.vessel import load_profile
 from tests.bench.identify import of_motion
-from tests.bench.page import Row, Section, duration, faster_row
+from tests.bench.page import Row, Section, Timed, faster_row, in_turn
 from tests.bench.processes import whole_process
 from tests.bench.rivals import rosbags_to_parquet
+from tests.bench.trials import ROUND_S, SCALE, VESSEL, written
 
 ROWS_A_LOG = 144_000
 """Two hours at 20 Hz."""
+HELP_GOAL_S = 0.08
+BATCH_LOGS, BATCH_GOAL_S = 20, 180.0
+RIVAL_LOGS = 4
+"""Logs of the batch that the rival reads; its time is multiplied."""
 PROFILE = load_profile("milliampere")
-FIT = ("fit", "--archive", "--vessel", "milliampere", "--delta", "0.4", "--sigma", "0.4")
+FIT = ("fit", "--archive", *VESSEL, *SCALE)
 WEAK = (*FIT, "--estimator", "weak")
-SWEEP = ("sweep", "components", "--archive", "--vessel", "milliampere", "--delta", "0.4", "--sigma", "0.4")
+SWEEP = ("sweep", "components", "--archive", *VESSEL, *SCALE)
 
 
 def run(quick: bool) -> Section:
@@ -80,48 +86,47 @@ def run(quick: bool) -> Section:
         "The pass over the rows forms basis and cross-products in chunks from arrays in memory, once; ingestion and smoothing, "
         "which the sums save as well, are not counted.",
     ]
+    start_up, same = _start_up(3 if quick else 15)
+    with tempfile.TemporaryDirectory() as folder:
+        rows = [*table, *_batch(2 if quick else BATCH_LOGS, Path(folder)), *start_up]
     return Section(
         "Archive and start-up",
-        [*table, *([] if quick else _batches(20)), *_start_up(3 if quick else 15)],
+        rows,
         notes,
-        ("rosbags", "distributed", "typer"),
+        ("rosbags", "typer"),
+        same=same,
     )
 
 
-def _batches(logs: int) -> list[Row]:
-    """Return how long a batch of simulated logs takes, ingestion, fit and report of each, whole process."""
-    with tempfile.TemporaryDirectory() as folder:
-        place = Path(folder)
-        scenario = load_scenario("twelve-corner")
-        paths = [place / f"trial{seed:02d}.mcap" for seed in range(logs)]
-        for seed, path in enumerate(paths):
-            write_log(simulate(scenario, seed), path)
-        recipe = place / "recipe.toml"
-        recipe.write_text('steps = ["fit"]\n', encoding="utf-8")
-        command = (
-            "batch",
-            str(place / "*.mcap"),
-            "--vessel",
-            "milliampere",
-            "--recipe",
-            str(recipe),
-            "--processes",
-            "2",
-        )
-        pool, _ = whole_process((*command, "--out", str(place / "pool")))
-        with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
-            dask, _ = whole_process((*command, "--out", str(place / "dask"), "--dask", cluster.scheduler_address))
-        tables = [place / path.stem for path in paths]
-        for one in tables:
-            one.mkdir()
-        start = time.perf_counter()
-        with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as workers:
-            list(workers.map(rosbags_to_parquet, paths, tables))
-        rosbags = time.perf_counter() - start
-    what = f"batch of {logs} logs of 12 min, ingested and fitted, two processes"
+def _batch(logs: int, folder: Path) -> list[Row | Timed]:
+    """Return how long a batch of simulated logs takes, ingestion, fit, diagnosis and pages of each, whole process."""
+    paths = [written(folder, number, ROUND_S) for number in range(logs)]
+    recipe = folder / "recipe.toml"
+    recipe.write_text('steps = ["fit", "diagnose"]\n', encoding="utf-8")
+    words = (
+        "batch",
+        *map(str, paths),
+        *VESSEL,
+        "--recipe",
+        str(recipe),
+        "--processes",
+        "2",
+        "--out",
+        str(folder / "pool"),
+    )
+    took, _ = whole_process(words)
+    rival = paths[:RIVAL_LOGS]
+    tables = [folder / path.stem for path in rival]
+    for one in tables:
+        one.mkdir()
+    start = time.perf_counter()
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as workers:
+        list(workers.map(rosbags_to_parquet, rival, tables))
+    rosbags_s = (time.perf_counter() - start) * logs / len(rival)
+    what = f"batch of {logs} logs of 12 min, ingested, fitted and diagnosed, two processes"
     return [
-        faster_row(what, [pool], "rosbags to Parquet in a pool of two, no fit", [rosbags], None),
-        faster_row(what, [pool], "the same on a Dask cluster of two workers", [dask], None),
+        Timed(what, took, BATCH_GOAL_S * logs / BATCH_LOGS),
+        faster_row(what, [took], "rosbags to Parquet in a pool of two, no fit", [rosbags_s], None),
     ]
 
 
@@ -226,23 +231,20 @@ def _one_pass(rows: int) -> float:
     return (time.perf_counter() - start) * rows / part
 
 
-def _start_up(repeats: int) -> list[Row]:
-    """Return how long the command line takes to say what it is, against importing its parser alone."""
+def _start_up(repeats: int) -> tuple[list[Row | Timed], dict[str, float]]:
+    """Return how long the command line takes to say what it is, and what Python and its parser take of that [s]."""
     main = "from ferryid.cli.main import main; main()"
     works = {
-        "--help": [sys.executable, "-c", main, "--help"],
-        "--version": [sys.executable, "-c", main, "--version"],
-        "typer": [sys.executable, "-c", "import typer"],
+        "--help": (main, "--help"),
+        "--version": (main, "--version"),
+        "typer": ("import typer",),
+        "Python": ("pass",),
     }
-    times: dict[str, list[float]] = {name: [] for name in works}
-    for _ in range(repeats):
-        for name, command in works.items():
-            start = time.perf_counter()
-            subprocess.run(command, check=True, capture_output=True)
-            times[name].append(time.perf_counter() - start)
-    table = []
-    for name in ("--help", "--version"):
-        row = faster_row(f"ferryid {name}, whole process", times[name], "import typer", times["typer"], None)
-        took = float(np.median(times[name]))
-        table.append(replace(row, goal="≤ 80 ms", reached=took <= 0.08, ours=duration(took)))
-    return table
+
+    def process(words: Sequence[str]) -> Callable[[], object]:
+        return lambda: subprocess.run([sys.executable, "-c", *words], check=True, capture_output=True)
+
+    times = dict(zip(works, in_turn([process(words) for words in works.values()], repeats), strict=True))
+    middle = {name: statistics.median(took) for name, took in times.items()}
+    rows = [Timed(f"ferryid {name}, whole process", middle[name], HELP_GOAL_S) for name in ("--help", "--version")]
+    return rows, {"import typer, whole process": middle["typer"], "bare Python, whole process": middle["Python"]}

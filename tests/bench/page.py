@@ -8,7 +8,7 @@ import os
 import platform
 import statistics
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from math import log10
 from typing import Any
@@ -18,6 +18,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ferryid.report.figures import BASE, MEASURED, NEW, STYLE, svg_text
+from tests.bench import yardstick
 
 
 @dataclass(frozen=True)
@@ -35,22 +36,74 @@ class Row:
     @property
     def over_goal(self) -> float | None:
         """How many times as good as the goal asks for; None where a ratio has no goal of its own."""
-        sign, _, number = self.goal.partition(" ")
-        try:
-            wanted = float(number)
-        except ValueError:
+        if not self.goal:
             return None
-        return self.ratio / wanted if sign == "≥" else wanted / self.ratio
+        sign, number, *_ = self.goal.split()
+        return self.ratio / float(number) if sign == "≥" else float(number) / self.ratio
+
+
+@dataclass(frozen=True)
+class Timed:
+    """What has a goal in seconds: time and goal become multiples of the yardstick (`tests.bench.yardstick`).
+
+    `more` stands behind the time; `otherwise` tells whether what else is asked of it, such as memory, is kept.
+    """
+
+    what: str
+    took_s: float
+    goal_s: float
+    more: str = ""
+    otherwise: bool = True
+
+    def row(self, yardstick_s: float) -> Row:
+        """Return the row of the page, by what the yardstick took in this run [s]."""
+        ratio, goal = self.took_s / yardstick_s, self.goal_s / yardstick.GOALS_S
+        return Row(
+            self.what,
+            duration(self.took_s) + self.more,
+            "the yardstick",
+            duration(yardstick_s),
+            ratio,
+            f"≤ {goal:.3g} ({self.goal_s:g} s)",
+            ratio <= goal and self.otherwise,
+        )
+
+
+@dataclass(frozen=True)
+class Curve:
+    """How a time grows: (size, time [s]), and what the size is; curves against the same are drawn together."""
+
+    what: str
+    against: str
+    points: Sequence[tuple[float, float]]
 
 
 @dataclass(frozen=True)
 class Section:
-    """One table of the page; `packages` are those whose versions matter to it."""
+    """One table of the page.
+
+    Attributes
+    ----------
+    packages
+        Those whose versions matter to it.
+    curves
+        What is drawn of growth.
+    same
+        Times of work that was measured on the machine of the goals as well [s], by its name in `yardstick.THERE`.
+    yardstick_s
+        The yardstick, measured beside this part [s].
+    took_s
+        How long it took to measure this part [s].
+    """
 
     title: str
-    rows: Sequence[Row]
+    rows: Sequence[Row | Timed]
     notes: Sequence[str] = ()
-    packages: Sequence[str] = field(default=())
+    packages: Sequence[str] = ()
+    curves: Sequence[Curve] = ()
+    same: Mapping[str, float] = field(default_factory=dict)
+    yardstick_s: Sequence[float] = ()
+    took_s: float = 0.0
 
 
 def packed(section: Section) -> dict[str, Any]:
@@ -60,7 +113,13 @@ def packed(section: Section) -> dict[str, Any]:
 
 def unpacked(plain: dict[str, Any]) -> Section:
     """Return the section of `packed`."""
-    return Section(**{**plain, "rows": [Row(**row) for row in plain["rows"]]})
+    rows = [(Timed if "goal_s" in row else Row)(**row) for row in plain["rows"]]
+    return Section(**{**plain, "rows": rows, "curves": [Curve(**curve) for curve in plain["curves"]]})
+
+
+def judged(section: Section, yardstick_s: float) -> list[Row]:
+    """Return the rows of a section with goals in seconds turned into multiples of the yardstick."""
+    return [row.row(yardstick_s) if isinstance(row, Timed) else row for row in section.rows]
 
 
 def in_turn(works: Sequence[Callable[[], object]], repeats: int) -> list[list[float]]:
@@ -112,9 +171,9 @@ def duration(value_s: float) -> str:
     return f"{value_s:.3g} s" if value_s >= 1 else f"{value_s * 1e3:.3g} ms"
 
 
-def drawing(sections: Sequence[Section]) -> str:
+def drawing(rows: Sequence[Row]) -> str:
     """Return a figure (SVG) of every ratio over its goal: what ends to the right of the line is reached."""
-    rows = [(row, value) for section in sections for row in section.rows if (value := row.over_goal) is not None]
+    rows = [(row, value) for row in rows if (value := row.over_goal) is not None]
     with mpl.rc_context(STYLE | {"font.size": 7}):
         figure = Figure(figsize=(9.0, 0.6 + 0.17 * len(rows)), layout="tight")
         ax = figure.subplots()
@@ -130,10 +189,42 @@ def drawing(sections: Sequence[Section]) -> str:
         return svg_text(figure)
 
 
-def page(sections: Sequence[Section], quick: bool, picture: str = "") -> str:
-    """Return the page of all sections in Markdown, with the address of their `drawing`."""
+def growth(curves: Sequence[Curve]) -> str:
+    """Return a figure (SVG) of times over sizes, a panel for each kind of size, with the line of linear growth."""
+    panels = {curve.against: [one for one in curves if one.against == curve.against] for curve in curves}
+    with mpl.rc_context(STYLE | {"font.size": 7}):
+        figure = Figure(figsize=(9.0, 3.2 * -(-len(panels) // 2)), layout="tight")
+        axes = figure.subplots(-(-len(panels) // 2), 2, squeeze=False).ravel()
+        for ax in axes[len(panels) :]:
+            ax.set_axis_off()
+        for ax, (against, shown) in zip(axes, panels.items(), strict=False):
+            for curve, colour in zip(shown, mpl.color_sequences["tab10"], strict=False):
+                sizes, times = zip(*curve.points, strict=True)
+                ax.loglog(sizes, times, marker="o", markersize=3, linewidth=1.0, color=colour, label=curve.what)
+            ends = [
+                min(size for one in shown for size, _ in one.points),
+                max(size for one in shown for size, _ in one.points),
+            ]
+            low = min(time_s for one in shown for _, time_s in one.points)
+            ax.loglog(
+                ends,
+                [low, low * ends[1] / ends[0]],
+                color=MEASURED,
+                linestyle=":",
+                linewidth=0.8,
+                label="in proportion",
+            )
+            ax.set_xlabel(against)
+            ax.set_ylabel("time [s]")
+            ax.legend()
+        return svg_text(figure)
+
+
+def page(sections: Sequence[Section], quick: bool, pictures: Sequence[tuple[str, str]] = ()) -> str:
+    """Return the page of all sections in Markdown, with the captions and addresses of its figures."""
     packages = sorted({name for section in sections for name in section.packages})
     versions = "".join(f", {name} {importlib.metadata.version(name)}" for name in packages)
+    same = {name: took_s for section in sections for name, took_s in section.same.items()}
     lines = [
         "# Benchmarks",
         "",
@@ -142,18 +233,27 @@ def page(sections: Sequence[Section], quick: bool, picture: str = "") -> str:
         "",
         f"{os.cpu_count()} cores ({platform.machine()}), Python {platform.python_version()}{versions}.",
         "",
+        *yardstick.text(yardsticks(sections), same),
     ]
     if quick:
         lines += ["**A quick run on short logs: the goals are for long ones.**", ""]
-    if picture:
-        lines += [f"![Every ratio over its goal]({picture})", ""]
+    for caption, picture in pictures:
+        lines += [f"![{caption}]({picture})", ""]
     for section in sections:
         lines += [f"## {section.title}", "", "| what | ours | rival | rival takes | ratio | goal | reached |"]
         lines.append("|---|--:|---|--:|--:|--:|---|")
-        for row in section.rows:
+        for row in judged(section, statistics.median(yardsticks(sections))):
             reached = "" if row.reached is None else "yes" if row.reached else "**no**"
             lines.append(
                 f"| {row.what} | {row.ours} | {row.rival} | {row.rival_value} | {row.ratio:.3g} | {row.goal} | {reached} |"
             )
         lines += ["", *(f"- {note}" for note in section.notes), ""]
+    parts = ", ".join(f"{section.title} {section.took_s:.0f} s" for section in sections)
+    whole_s = sum(section.took_s for section in sections)
+    lines += ["## How long this page takes", "", f"{whole_s / 60:.1f} minutes: {parts}."]
     return "\n".join(lines).rstrip() + "\n"
+
+
+def yardsticks(sections: Sequence[Section]) -> list[float]:
+    """Return every measurement of the yardstick in this run [s]."""
+    return [took_s for section in sections for took_s in section.yardstick_s]

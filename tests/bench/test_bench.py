@@ -9,9 +9,15 @@ from types import SimpleNamespace
 import pytest
 
 from tests.bench import __main__ as bench
-from tests.bench.page import Row, Section
+from tests.bench import yardstick
+from tests.bench.page import Curve, Row, Section, Timed
 
-ROWS = [Row("12 min", "1 s", "rosbags", "20 s", 20.0, "≥ 35", reached=False), Row("growth", "2 s", "1 h", "1 s", 2.0)]
+ROWS: list[Row | Timed] = [
+    Row("12 min", "1 s", "rosbags", "20 s", 20.0, "≥ 35", reached=False),
+    Row("growth", "2 s", "1 h", "1 s", 2.0),
+    Timed("fit", 3.0, 1.5, ", 1 GB"),
+]
+CURVES = [Curve("diagnose", "length [min]", [(12.0, 5.0), (24.0, 9.0)])]
 
 
 @pytest.mark.draws
@@ -22,17 +28,19 @@ def test_an_ended_run_goes_on_and_the_next_one_measures_anew(tmp_path: Path, mon
     def module(path: str) -> SimpleNamespace:
         name = path.rpartition(".")[2]
 
-        def run(quick: bool) -> Section:
+        def run(quick: bool, folder: Path | None = None) -> Section:
             asked.append(name)
             if name in ends:
                 raise KeyboardInterrupt
-            return Section(name, ROWS, [f"A note on {name}."])
+            return Section(name, ROWS, [f"A note on {name}."], curves=CURVES, same={"ikpls, 7.2 million rows": 3.4})
 
         return SimpleNamespace(run=run)
 
     page = tmp_path / "page.md"
     monkeypatch.setattr(bench, "DONE", tmp_path / "lines.jsonl")
     monkeypatch.setattr(bench, "importlib", SimpleNamespace(import_module=module))
+    monkeypatch.setattr(bench.yardstick, "measured", lambda folder: 2 * bench.yardstick.GOALS_S)
+    monkeypatch.setattr(bench.time, "perf_counter", lambda: 0.0)
     monkeypatch.setattr(sys, "argv", ["bench", "--out", str(page)])
     with pytest.raises(KeyboardInterrupt):
         bench.main()
@@ -44,3 +52,23 @@ def test_an_ended_run_goes_on_and_the_next_one_measures_anew(tmp_path: Path, mon
     assert asked[-len(bench.MODULES) :] == list(bench.MODULES)
     assert page.read_text(encoding="utf-8") == resumed
     assert resumed.count("| 12 min | 1 s | rosbags | 20 s | 20 | ≥ 35 | **no** |") == len(bench.MODULES)
+    assert "| fit | 3 s, 1 GB | the yardstick | 2.72 s | 1.1 | ≤ 1.1 (1.5 s) | yes |" in resumed
+    assert (tmp_path / "page-growth.svg").exists()
+
+
+@pytest.mark.parametrize(
+    ("took_s", "otherwise", "reached"), [(3.0, True, True), (3.1, True, False), (2.9, False, False)]
+)
+def test_a_goal_in_seconds_is_one_in_yardsticks(took_s: float, otherwise: bool, reached: bool) -> None:
+    row = Timed("fit", took_s, 1.5, otherwise=otherwise).row(2 * yardstick.GOALS_S)
+    assert row.ratio == pytest.approx(took_s / (2 * yardstick.GOALS_S))
+    assert row.over_goal == pytest.approx(3.0 / took_s, rel=5e-3)
+    assert row.reached is reached
+
+
+def test_the_page_says_how_other_work_compares_with_the_yardstick() -> None:
+    times, same = [2 * yardstick.GOALS_S], {"ikpls, 7.2 million rows": 6.8, "bare Python, whole process": 0.0045}
+    said = "\n".join(yardstick.text(times, same))
+    assert "| ikpls, 7.2 million rows | 1.7 s | 6.8 s | 4 |" in said
+    assert "0.5 (bare Python, whole process) to 4 (ikpls, 7.2 million rows)" in said
+    assert "easier to reach than it was there for work of the first kind, and harder to reach than it was there" in said

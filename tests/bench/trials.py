@@ -1,0 +1,82 @@
+"""Simulated trials to measure on: the 12-corner path of milliAmpère, of any length, again and again."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from ferryid.simulate import load_scenario, simulate, write_log
+
+SCENARIO = """schema = "ferryid.scenario/1"
+title = "12-corner calibration of milliAmpère, again and again, in a breeze"
+vessel = "milliampere"
+start = 2021-04-20T{start}Z
+seed = {seed}
+duration_s = {seconds}
+
+[path]
+kind = "twelve-corner"
+dwell_s = {dwell_s:g}
+rounds = {rounds}
+
+[controller]
+delta = 0.4
+sigma = 0.4
+
+[environment.wind]
+north_mps = {north:.2f}
+east_mps = {east:.2f}
+gust_std_mps = 0.25
+gust_time_s = 8
+
+[sensors]
+imu_rate_hz = 0
+camera_rate_hz = 0
+"""
+GAPS = """dropouts_per_min = 0.05
+dropout_s = 1.0
+
+[sensors.navigation]
+dropouts_per_min = 0.1
+dropout_s = 5.0
+"""
+ROUND_S = 720
+VESSEL = ("--vessel", "milliampere")
+SCALE = ("--delta", "0.4", "--sigma", "0.4")
+
+
+def written(folder: Path, number: int, seconds: int, *, gaps: bool = False, after_s: int = 60) -> Path:
+    """Return a log of this length as MCAP, simulated where the folder does not hold it.
+
+    Parameters
+    ----------
+    folder
+        Where logs are kept.
+    number
+        Each begins `after_s` after the one with the number before has ended, and has a wind of its own.
+    seconds
+        Length [s].
+    gaps
+        Navigation misses 5 s about every ten minutes, and each thruster 1 s about every twenty.
+    after_s
+        Time between the logs [s].
+    """
+    path = folder / f"{'gaps' if gaps else 'log'}{number:03d}-{seconds}.mcap"
+    if path.exists():
+        return path
+    start = 8 * 3600 + number * (seconds + after_s)
+    clock = f"{start // 3600 % 24:02d}:{start % 3600 // 60:02d}:{start % 60:02d}"
+    angle = 2.4 * number
+    text = SCENARIO.format(
+        start=clock,
+        seed=31 + number,
+        seconds=seconds,
+        dwell_s=60 if seconds >= ROUND_S else max(5.0, seconds / 12),
+        rounds=-(-seconds // ROUND_S),
+        north=0.7 * math.cos(angle),
+        east=0.7 * math.sin(angle),
+    )
+    toml = path.with_suffix(".toml")
+    toml.write_text(text + (GAPS if gaps else ""), encoding="utf-8")
+    write_log(simulate(load_scenario(str(toml))), path)
+    return path
