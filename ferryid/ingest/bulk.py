@@ -36,6 +36,8 @@ __all__ = ["Decoder", "decoder_for", "leaf_fields"]
 SCRATCH_ROWS = 2048
 SCRATCH_BYTES = 4 << 20
 FIRST_ROWS = 64
+# As many messages at a time are read from where they lie, without those of other calls.
+DIRECT_ROWS = 256
 # A larger message is decoded by rosbags only if it holds no more values than this: each becomes an object of Python.
 COUNTED_BYTES = 1 << 20
 MAX_VALUES = 1_000_000
@@ -238,6 +240,8 @@ class BulkDecoder:
             rows, starts = rows[starts <= inside], starts[starts <= inside]
             if not len(starts):
                 return
+        if len(group.layouts) == 1 and group.layouts[0].sparse and len(starts) >= DIRECT_ROWS:
+            starts, rows = self._pieces(group.layouts[0], buffer, starts, rows)
         # Every window of this size over the buffer, overlapping: indexing it copies whole messages at memory speed.
         windows = np.ndarray((inside + 1,), group.messages.dtype, buffer=buffer, strides=(1,))
         taken = 0
@@ -253,6 +257,26 @@ class BulkDecoder:
                 if len(group.rows) == FIRST_ROWS:
                     larger = _Group.of(size, SCRATCH_ROWS)
                     group.messages, group.rows = larger.messages, larger.rows
+
+    def _pieces(
+        self, layout: Fixed, buffer: Any, starts: NDArray[np.int64], rows: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Copy the wanted fields alone of messages of one layout to the columns; returns the messages of another."""
+        others = []
+        for first in range(0, len(starts), SCRATCH_ROWS):
+            here = rows[first : first + SCRATCH_ROWS]
+            records = layout.gathered(buffer, starts[first : first + SCRATCH_ROWS])
+            wrong = layout.mismatches(records)
+            if wrong is None:
+                fitting = here
+                faults = layout.copy(records, self._columns, _where(here), slice(None))
+            else:
+                others.append(first + np.flatnonzero(wrong))
+                fitting = here[~wrong]
+                faults = layout.copy(records, self._columns, fitting, ~wrong)
+            self._bad.extend(int(fitting[position]) for position in faults)
+        left = np.concatenate(others) if others else np.empty(0, np.int64)
+        return starts[left], rows[left]
 
     def _flush(self, group: _Group) -> None:
         """Copy everything gathered in the group to the columns."""
@@ -272,16 +296,15 @@ class BulkDecoder:
                 layout = fresh
                 group.layouts.append(layout)
             known += 1
-            wrong = layout.mismatches(messages)
+            records = layout.records(messages)
+            wrong = layout.mismatches(records)
             if wrong is None and len(left) == len(rows):
-                contiguous = rows[-1] - rows[0] == len(rows) - 1
-                where: Any = slice(int(rows[0]), int(rows[-1]) + 1) if contiguous else rows
                 fitting, left = left, left[:0]
-                faults = layout.copy(messages, self._columns, where, slice(None))
+                faults = layout.copy(records, self._columns, _where(rows), slice(None))
             else:
                 fitting = left if wrong is None else left[~wrong[left]]
                 left = left[:0] if wrong is None else left[wrong[left]]
-                faults = layout.copy(messages, self._columns, rows[fitting], fitting)
+                faults = layout.copy(records, self._columns, rows[fitting], fitting)
             self._bad.extend(int(rows[fitting[position]]) for position in faults)
 
     def _layout_of(self, sample: bytes) -> Fixed | None:
@@ -300,7 +323,7 @@ class BulkDecoder:
         message = np.frombuffer(sample, f"V{len(sample)}")
         ours = {path: np.empty(1, target.dtype) for path, target in self._targets.items()}
         theirs = {path: np.empty(1, target.dtype) for path, target in self._targets.items()}
-        fixed.copy(message, ours, slice(0, 1), slice(None))
+        fixed.copy(fixed.records(message), ours, slice(0, 1), slice(None))
         self._fill(theirs, 0, values)
         same = all(
             np.array_equal(ours[path], theirs[path], equal_nan=target.dtype.kind == "f")
@@ -367,6 +390,11 @@ class BulkDecoder:
                 end_ns=int(times.max()),
             ),
         )
+
+
+def _where(rows: NDArray[np.int64]) -> Any:
+    """Return rows of the columns as an index, as a slice where they follow one another."""
+    return slice(int(rows[0]), int(rows[-1]) + 1) if rows[-1] - rows[0] == len(rows) - 1 else rows
 
 
 def _grown(column: Column, rows: int, capacity: int) -> Column:

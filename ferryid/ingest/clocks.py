@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ferryid.counts import counted, verb
 from ferryid.ingest.log import Series
+from ferryid.ingest.side_by_side import of_each
 from ferryid.ingest.stamp_clock import CONSTANT_OFFSET_NS, SECOND_NS, STEP_NS, ClockFacts, compare_clocks, spread_sample
 from ferryid.ingest.stray_times import stray_times
 from ferryid.types import Nanoseconds
@@ -115,7 +116,12 @@ def repair_all(series: Mapping[str, Series]) -> dict[str, tuple[Nanoseconds, Row
     dict
         By topic: strictly rising times [ns], shape (m,); the indices of the rows kept, in that order, shape (m,); the report.
     """
-    found = {topic: _one_topic(one.receive_ns, one.stamp_ns, one.time_column) for topic, one in series.items()}
+    each = of_each(
+        lambda one: _one_topic(one.receive_ns, one.stamp_ns, one.time_column),
+        series.values(),
+        sum(len(one.receive_ns) for one in series.values()),
+    )
+    found = dict(zip(series, each, strict=True))
     stamped = sorted(
         (report.offset_s, topic)
         for topic, (_, _, report) in found.items()

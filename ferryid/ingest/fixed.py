@@ -15,8 +15,23 @@ from ferryid.ingest.log import Column
 LITTLE_ENDIAN_CDR = int.from_bytes(b"\x00\x01", "little")
 
 
+GAP_BYTES = 64
+"""Fields of a message with more than a cache line between them are copied in pieces of their own."""
+SPARSE = 0.75
+"""Pieces are worth their calls where they hold less than this part of the message."""
+
+Records = Mapping[str, NDArray[Any]] | NDArray[np.void]
+"""Fields of a number of messages by name, each of shape (n,)."""
+
+
 class Fixed:
-    """One layout, ready to be read from gathered messages: a structured dtype over their bytes."""
+    """One layout, ready to be read from gathered messages: a structured dtype over their bytes.
+
+    Attributes
+    ----------
+    sparse
+        Whether `gathered` copies much less than the messages.
+    """
 
     def __init__(self, layout: Layout, cdr: bool, wanted: Mapping[str, Target]) -> None:
         spans: dict[str, tuple[str, int]] = {}
@@ -34,20 +49,29 @@ class Fixed:
             primitive = wanted[path].primitive
             if length:
                 spans[path] = f"V{length}" if primitive == "string" else PRIMITIVES[primitive], offset
-        self._dtype = np.dtype(
-            {
-                "names": list(spans),
-                "formats": [code for code, _ in spans.values()],
-                "offsets": [offset for _, offset in spans.values()],
-                "itemsize": layout.size,
-            }
-        )
+        self._dtype = _structure(spans, 0, layout.size)
+        self._pieces = _pieces(spans)
+        self.sparse = sum(dtype.itemsize for _, dtype in self._pieces) < SPARSE * layout.size
         self._wanted = wanted
         self._places = layout.places
 
-    def mismatches(self, messages: NDArray[np.void]) -> NDArray[np.bool_] | None:
+    def records(self, messages: NDArray[np.void]) -> Records:
+        """Return the fields of whole messages, shape (n,)."""
+        return messages.view(self._dtype)
+
+    def gathered(self, buffer: Any, starts: NDArray[np.int64]) -> Records:
+        """Copy the fields of the messages that begin at `starts` out of a buffer that holds them whole."""
+        size = memoryview(buffer).nbytes
+        found: dict[str, NDArray[Any]] = {}
+        for offset, dtype in self._pieces:
+            # Every window of this size over the buffer, overlapping: indexing it copies pieces at memory speed.
+            windows = np.ndarray((size - dtype.itemsize + 1,), f"V{dtype.itemsize}", buffer, strides=(1,))
+            piece = windows[starts + offset].view(dtype)
+            found |= {name: piece[name] for name in dtype.names or ()}
+        return found
+
+    def mismatches(self, records: Records) -> NDArray[np.bool_] | None:
         """Return which messages have another layout, shape (n,), or None when all have this one."""
-        records = messages.view(self._dtype)
         wrong: NDArray[np.bool_] | None = None
         for name, value in self._expected.items():
             differs = records[name] != value
@@ -55,7 +79,7 @@ class Fixed:
                 wrong = differs if wrong is None else wrong | differs
         return wrong
 
-    def copy(self, messages: NDArray[np.void], columns: Mapping[str, Column], rows: Any, picked: Any) -> list[int]:
+    def copy(self, records: Records, columns: Mapping[str, Column], rows: Any, picked: Any) -> list[int]:
         """Copy the wanted fields of the picked messages into `rows` of the columns.
 
         Returns
@@ -63,7 +87,6 @@ class Fixed:
         list
             Positions among the picked messages whose strings are not UTF-8.
         """
-        records = messages.view(self._dtype)
         undecoded: set[int] = set()
         for path, target in self._wanted.items():
             place = self._places.get(path)
@@ -78,6 +101,31 @@ class Fixed:
             else:
                 columns[path][rows] = records[path][picked]
         return sorted(undecoded)
+
+
+def _structure(spans: Mapping[str, tuple[str, int]], first: int, size: int) -> np.dtype[Any]:
+    """Return the dtype of `size` bytes from the offset `first` that has the fields (code, offset) of `spans`."""
+    return np.dtype(
+        {
+            "names": list(spans),
+            "formats": [code for code, _ in spans.values()],
+            "offsets": [offset - first for _, offset in spans.values()],
+            "itemsize": size,
+        }
+    )
+
+
+def _pieces(spans: Mapping[str, tuple[str, int]]) -> list[tuple[int, np.dtype[Any]]]:
+    """Return offset and dtype of the pieces of a message that hold these fields (code, offset)."""
+    pieces: list[tuple[int, int, dict[str, tuple[str, int]]]] = []
+    for name, (code, offset) in sorted(spans.items(), key=lambda item: item[1][1]):
+        end = offset + np.dtype(code).itemsize
+        if pieces and offset - pieces[-1][1] <= GAP_BYTES:
+            first, last, inside = pieces[-1]
+            pieces[-1] = first, max(last, end), {**inside, name: (code, offset)}
+        else:
+            pieces.append((offset, end, {name: (code, offset)}))
+    return [(first, _structure(inside, first, last - first)) for first, last, inside in pieces]
 
 
 def _texts(raw: NDArray[np.void] | None, count: int) -> tuple[Column, list[int]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import mmap
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,10 @@ from ferryid.ingest.mcap_chunks import Loaded
 from ferryid.ingest.mcap_index import DATA_END, RECORD_HEADER, ExcessError, Messages, record_header
 from ferryid.ingest.mcap_recovery import read_index
 from ferryid.ingest.mcap_spans import spans
+from ferryid.ingest.side_by_side import Call, decode_together
+
+DECODERS = 1
+"""Threads that decode topics of a batch beside this one."""
 
 
 @dataclass(frozen=True)
@@ -154,14 +159,17 @@ class McapLog:
         groups, losses = self._groups(wanted)
         ids = [channel for group in groups for channel in group.channels]
         found = dict.fromkeys(ids, 0)
-        for loaded in self._loaded(ids, verify):
-            losses += loaded.losses
-            for group in groups:
-                messages = _merged([loaded.messages[key] for key in group.channels if key in loaded.messages])
-                if messages is not None:
-                    group.decoder.add(loaded.buffer, messages.starts, messages.sizes, messages.log_ns)
-            for key, messages in loaded.messages.items():
-                found[key] += len(messages)
+        with ThreadPoolExecutor(DECODERS) as pool:
+            for loaded in self._loaded(ids, verify):
+                losses += loaded.losses
+                calls: list[Call] = []
+                for group in groups:
+                    messages = _merged([loaded.messages[key] for key in group.channels if key in loaded.messages])
+                    if messages is not None:
+                        calls.append((group.decoder, loaded.buffer, messages.starts, messages.sizes, messages.log_ns))
+                decode_together(pool, calls)
+                for key, messages in loaded.messages.items():
+                    found[key] += len(messages)
         if verify:
             losses += self._data_checksum()
         # Topics that are not wanted have the messages that the index or a walk over their chunks shows.

@@ -16,6 +16,7 @@ from ferryid.ingest import log_suffixes, open_log
 from ferryid.ingest.clocks import ClockReport, Rows, repair_all
 from ferryid.ingest.hashing import content_hash
 from ferryid.ingest.log import Reader, Series, Topic
+from ferryid.ingest.side_by_side import of_each
 from ferryid.signals import cache
 from ferryid.signals.data_quality import data_quality, grouped_notes, loss_sentence, main_loss
 from ferryid.signals.empty_streams import without_empty
@@ -134,11 +135,13 @@ def make_recording(
     FerryIdError
         Where no mapped topic has a row, or a field is not what the profile says.
     """
-    streams = {
-        stream_name(topic, where): _stream(profile, series[topic], *repaired[topic], where)
-        for topic in selection.wanted
-        for where in _choices(profile, topic)
-    }
+    wanted = [(topic, where) for topic in selection.wanted for where in _choices(profile, topic)]
+    converted = of_each(
+        lambda one: _stream(profile, series[one[0]], *repaired[one[0]], one[1]),
+        wanted,
+        sum(len(series[topic].receive_ns) for topic, _ in wanted),
+    )
+    streams = {stream_name(*one): stream for one, stream in zip(wanted, converted, strict=True)}
     chosen = any(signal.where for signal in profile.signals)
     if not any(len(stream.time_ns) for stream in streams.values()):
         raise FerryIdError(

@@ -210,6 +210,46 @@ def test_rosbags_decodes_one_sample_of_each_layout_and_no_more(encoding: str, de
     assert series.columns["header.frame_id"].tolist() == [frames[index % 3 == 0][0] for index in expected]
 
 
+@pytest.mark.parametrize("encoding", ["ros1", "cdr"])
+def test_pieces_of_messages_give_what_whole_ones_do(encoding: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    store = get_typestore(Stores.ROS1_NOETIC if encoding == "ros1" else Stores.ROS2_HUMBLE)
+    write = store.serialize_ros1 if encoding == "ros1" else store.serialize_cdr
+    frames = [("odom", "base_link"), ("odometry_", "link")]
+
+    def message(index: int, other: bool) -> bytes:
+        one = odometry(store, "", float(index))
+        one.header.frame_id, one.child_frame_id = frames[other]
+        one.twist.twist.angular.z = -float(index)
+        raw = bytes(write(one, "nav_msgs/msg/Odometry"))
+        # No UTF-8.
+        return raw.replace(b"odom", b"od\xffm") if index == 701 else raw
+
+    # The first call shows one layout, the second brings the other of the same total size.
+    raws = [message(index, index >= 200 and index % 7 == 0) for index in range(3000)]
+    size = len(raws[0])
+    wanted = ["pose.pose.position.x", "header.frame_id", "twist.twist.angular.z"]
+    copied: list[int] = []
+    gathered = bulk.Fixed.gathered
+
+    def counted(self: Any, buffer: Any, starts: Any) -> Any:
+        copied.append(len(starts))
+        return gathered(self, buffer, starts)
+
+    monkeypatch.setattr(bulk.Fixed, "gathered", counted)
+    decoder = decoder_for(encoding, store, "nav_msgs/msg/Odometry", "/t", wanted, len(raws))
+    for first, last in ((0, 200), (200, 2900), (2900, 3000)):
+        starts = np.arange(last - first) * size
+        decoder.add(b"".join(raws[first:last]), starts, np.full(last - first, size), np.arange(first, last))
+    series = decoder.finish()
+    assert copied == [2048, 2700 - 2048]
+    kept = [index for index in range(3000) if index != 701]
+    assert [loss.messages for loss in decoder.losses("x")] == [1]
+    assert series.receive_ns.tolist() == kept
+    assert series.columns["pose.pose.position.x"].tolist() == [float(index) for index in kept]
+    assert series.columns["twist.twist.angular.z"].tolist() == [-float(index) for index in kept]
+    assert series.columns["header.frame_id"].tolist() == [frames[i >= 200 and i % 7 == 0][0] for i in kept]
+
+
 def test_cdr_worked_by_hand(decodes: list[int]) -> None:
     # float64 after uint8: seven bytes of padding counted from behind the encapsulation header; then a string of
     # length 3 with its terminator, two bytes to the next float32.
