@@ -53,7 +53,7 @@ def run(quick: bool) -> Section:
     rows = logs * ROWS_A_LOG
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)
-        _season(out, logs)
+        season(out, logs)
         size, windows = (
             sum(path.stat().st_size for path in out.glob(f"logs/*/{kind}-*.parquet")) for kind in ("pieces", "windows")
         )
@@ -130,7 +130,7 @@ def _batch(logs: int, folder: Path) -> list[Row | Timed]:
     ]
 
 
-def _season(out: Path, logs: int) -> None:
+def season(out: Path, logs: int) -> None:
     """Write what is kept of `logs` logs of two hours, all made of one simulated trial."""
     problem = out / "trial.mcap"
     write_log(simulate(load_scenario("twelve-corner"), 1), problem)

@@ -13,9 +13,11 @@ from ferryid.batch.kept import key_of, read_row, write_row
 from ferryid.batch.log_result import LogFile
 from ferryid.simulate import load_scenario, simulate, write_log
 from tests.bench.page import Row, Section, Timed, faster_row
-from tests.bench.processes import whole_process
+from tests.bench.processes import floor, whole_process
 from tests.bench.trials import SCALE, VESSEL
 
+TABLES = ("numpy", "pyarrow", "pyarrow.parquet", "typer")
+"""Packages that any program needs which has a command line and writes Parquet."""
 ROUND = """
 schema = "ferryid.scenario/1"
 title = "One round of the 12-corner path"
@@ -30,7 +32,7 @@ SHORT = Path(__file__).resolve().parents[2] / "fixtures" / "short.mcap"
 
 def run(quick: bool) -> Section:
     """Measure; `quick` fewer times, and a batch of a hundred logs."""
-    repeats, logs = (2, 100) if quick else (5, 1000)
+    repeats, logs = (1, 100) if quick else (3, 1000)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         trial, scenario = folder / "trial.mcap", folder / "round.toml"
@@ -42,9 +44,19 @@ def run(quick: bool) -> Section:
             _row("ferryid fit --no-report, 24 min", _fits(folder, trial, ("--no-report",), repeats), 0.8),
             _row("ferryid simulate, 12 min", _times([("simulate", str(scenario), *log)] * (repeats + 1))[1:], 1.0),
             *_compiled(folder, scenario),
-            _row(f"ferryid batch, {logs} logs and nothing to do", _resumed(folder / "batch", logs, repeats), 5.0),
+        ]
+        resume = _resumable(folder / "batch", logs)
+        rows.append(_row(f"ferryid batch, {logs} logs and nothing to do", _times([resume] * repeats), 5.0))
+        fits = [("fit", str(trial), *VESSEL, *SCALE, "--out", str(folder / f"floor{number}")) for number in range(4)]
+        simulation = ("simulate", str(scenario), *log)
+        floors = [
+            floor("`fit` of 24 min", fits[0], fits[1], (*TABLES, "matplotlib.figure")),
+            floor("`fit --no-report`", (*fits[2], "--no-report"), (*fits[3], "--no-report"), TABLES),
+            floor("`simulate` of 12 min", simulation, simulation, ("numpy", "numba", "typer")),
+            floor(f"`batch` of {logs} logs and nothing to do", resume, resume, ("numpy", "typer")),
         ]
     notes = (
+        *floors,
         "The log of a fit is read each time; what numba compiles is kept from the first run. The logs of the batch are links "
         "to one file, whose result is kept for each of them under its own name and hash.",
     )
@@ -70,8 +82,8 @@ def _fits(folder: Path, trial: Path, more: Sequence[str], repeats: int) -> list[
     return _times([("fit", str(trial), *VESSEL, *SCALE, *more, *out) for out in outs])
 
 
-def _resumed(folder: Path, logs: int, repeats: int) -> list[float]:
-    """Return the times of a batch all of whose logs are done [s]."""
+def _resumable(folder: Path, logs: int) -> tuple[str, ...]:
+    """Return the words of a batch all of whose logs are done."""
     folder.mkdir()
     recipe, out = folder / "recipe.toml", folder / "out"
     recipe.write_text('steps = ["fit"]\n[fit]\naccept = "thesis"\n', encoding="utf-8")
@@ -91,7 +103,7 @@ def _resumed(folder: Path, logs: int, repeats: int) -> list[float]:
         place = first.with_name(f"{path.stem}-{key_of([path], row.stamp)}")
         place.mkdir()
         write_row(place, replace(row, name=path.stem, files=files, sha256=f"{number:064x}"))
-    return _times([words] * repeats)
+    return words
 
 
 def _times(commands: Sequence[Sequence[str]]) -> list[float]:

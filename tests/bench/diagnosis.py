@@ -14,12 +14,12 @@ import numpy as np
 from ferryid.signals.recording import record
 from ferryid.vessel import load_profile
 from tests.bench.page import Curve, Row, Section, Timed, duration
-from tests.bench.processes import whole_process
+from tests.bench.processes import floor, whole_process
 from tests.bench.trials import VESSEL, written
 
 LENGTHS_S = {720: 5.0, 1440: 8.0, 3600: 45.0, 7200: 90.0}
 """Lengths of a single log [s], and the goal of each [s]; six hours are measured with gaps, in `tests.bench.long`."""
-REPEATED_S, REPEATS = 1440, 3
+REPEATED_S, REPEATS = 720, 3
 """Logs up to this length [s] are diagnosed so many times, and the median counts."""
 LOGS = {2: None, 7: None, 14: 20.0}
 """Logs of seven minutes in a campaign, and the goal of as many [s]."""
@@ -88,8 +88,15 @@ def run(quick: bool) -> Section:
             "Whole processes, report included, on tables that were ingested before; logs of up to "
             f"{REPEATED_S / 60:.0f} min {REPEATS} times, of which the median counts.",
             *(_growth(curve) for curve in curves),
+            floor(
+                f"`diagnose` of {min(single) / 60:.0f} min",
+                *(
+                    ("diagnose", str(*single[min(single)]), *VESSEL, "--out", str(folder / out))
+                    for out in ("out", "out")
+                ),
+                ("numpy", "numba", "scipy.optimize", "scipy.signal", "pyarrow.parquet", "matplotlib.figure", "typer"),
+            ),
             *_where(folder, single[min(single)], f"a log of {min(single) / 60:.0f} min"),
-            *_where(folder, together[min(together)], f"a campaign of {min(together)} logs"),
         ]
     return Section("Diagnosis", rows, notes, curves=curves)
 

@@ -25,7 +25,7 @@ from ferryid.regression.qr import QrFactor
 from ferryid.regression.resampling.bootstrap import Blocks, bootstrap_coefficients
 from ferryid.regression.simpls import fit_simpls
 from ferryid.signals.smooth import central_difference, moving_mean, odd_rows
-from tests.bench.page import Row, Section, duration, faster, faster_row, in_turn, within
+from tests.bench.page import Row, Section, duration, faster, faster_row, in_turn, seconds, within
 from tests.regression.rows import from_rows
 
 Floats = NDArray[np.float64]
@@ -49,7 +49,7 @@ def run(quick: bool) -> Section:
     many = 1_000_000 if quick else 100_000_000
     repeats = 3 if quick else 5
     same: dict[str, float] = {}
-    rows = [*fits(large, repeats, same), *sweeps(small, repeats), *bootstraps(small, repeats), fused(many, repeats)]
+    rows = [*fits(large, repeats, same), *sweeps(small, repeats), *bootstraps(small, repeats), fused(many, 3)]
     notes = [
         f"{MOST} regressors, 3 outputs; fits and draws with {COMPONENTS} components. Rivals get the same arrays, of which "
         "one row is one sample; ferryid's own fits never hold such an array.",
@@ -59,6 +59,8 @@ def run(quick: bool) -> Section:
         "The sweep is 5 windows × 5 folds × 21 components with smoothing and basis; rivals share ours of those two and "
         "differ in cross-validation alone. scikit-learn's grid search refits for every number of components; one fold of "
         f"one window of it is timed and counted {len(WINDOWS_S) * FOLDS} times.",
+        f"Of the {many:,} rows, evaluating the basis alone takes {duration(basis_alone(many))}, and the products of its terms "
+        f"with one another alone, in chunks that stay in the cache, {duration(products_alone(many))}.",
         f"Fit of {large:,} rows: {extra_memory(large) / 1e6:.1f} MB beside the data.",
         *digits(),
     ]
@@ -202,6 +204,23 @@ def fused(n: int, repeats: int) -> Row:
                 values.sum()
 
     return within(f"{n:,} rows, basis and cross-products", ours, "one read of the inputs (sum)", read, 6, repeats)
+
+
+CHUNK = 8192
+
+
+def basis_alone(n: int) -> float:
+    """Return what the basis of `n` rows takes, chunk by chunk into the same memory [s]; a tenth of them is timed."""
+    function = make_basis("thesis")
+    nu, nu_dot = np.random.default_rng(0).standard_normal((2, CHUNK, 3))
+    into = np.empty((len(function.terms), CHUNK))
+    return 10 * seconds(lambda: [function.fill(into, nu, nu_dot) for _ in range(n // 10 // CHUNK)])
+
+
+def products_alone(n: int) -> float:
+    """Return what Z Z' takes of `n` columns of terms, outputs and one, chunk by chunk [s]; a tenth of them is timed."""
+    Z = np.random.default_rng(0).standard_normal((len(make_basis("thesis").terms) + 4, CHUNK))
+    return 10 * seconds(lambda: [Z @ Z.T for _ in range(n // 10 // CHUNK)])
 
 
 def once(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import os
+import statistics
 import subprocess
 import sys
 import time
@@ -29,3 +31,50 @@ def whole_process(arguments: Sequence[str], environment: Mapping[str, str] | Non
     if run.returncode:
         raise RuntimeError(f"ferryid {' '.join(arguments)} ended with {run.returncode}: {run.stderr}")
     return took, int(run.stderr.split()[-1]) * 1024
+
+
+TWICE = """
+import contextlib, io, json, sys, time
+from ferryid.cli.main import main
+took = []
+for words in json.loads(sys.argv[1]):
+    sys.argv = ["ferryid", *words]
+    start = time.perf_counter()
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):
+        main()
+    took.append(time.perf_counter() - start)
+print("took", *took)
+"""
+"""Runs commands in one process: the second has everything loaded and compiled."""
+
+
+def floor(what: str, first: Sequence[str], again: Sequence[str], packages: Sequence[str]) -> str:
+    """Return what of a command's time nothing of ferryid can save, and what is the work itself, as a sentence.
+
+    Parameters
+    ----------
+    what
+        The command.
+    first, again
+        Its words, and those of a second one that does the same work in the same process.
+    packages
+        What any program for this would import.
+    """
+    whole_s = min(whole_process(words)[0] for words in (first, again))
+    bare = [sys.executable, "-c", f"import {', '.join(packages)}"]
+    alone = []
+    for _ in range(3):
+        start = time.perf_counter()
+        subprocess.run(bare, check=True)
+        alone.append(time.perf_counter() - start)
+    run = subprocess.run(
+        [sys.executable, "-c", TWICE, json.dumps([first, again])], check=True, capture_output=True, text=True
+    )
+    work_s = float(run.stdout.rpartition("took")[2].split()[1])
+    import_s = statistics.median(alone)
+    return (
+        f"{what}: of {whole_s:.2g} s, a process that only imports {', '.join(packages)} takes {import_s:.2g} s "
+        f"({import_s / whole_s:.0%}), and the work itself, done a second time in one process, {work_s:.2g} s "
+        f"({work_s / whole_s:.0%}). The rest is loading "
+        "other modules and compiled code, and what is done once."
+    )

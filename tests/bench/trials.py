@@ -53,7 +53,7 @@ def written(folder: Path, number: int, seconds: int, *, gaps: bool = False, afte
     folder
         Where logs are kept.
     number
-        Each begins `after_s` after the one with the number before has ended, and has a wind of its own.
+        Each begins `after_s` after the one with the number before has ended, and, without gaps, has a wind of its own.
     seconds
         Length [s].
     gaps
@@ -66,7 +66,8 @@ def written(folder: Path, number: int, seconds: int, *, gaps: bool = False, afte
         return path
     start = 8 * 3600 + number * (seconds + after_s)
     clock = f"{start // 3600 % 24:02d}:{start % 3600 // 60:02d}:{start % 60:02d}"
-    angle = 2.4 * number
+    # Parts of one recording are in one wind.
+    angle = 0.0 if gaps else 2.4 * number
     text = SCENARIO.format(
         start=clock,
         seed=31 + number,
