@@ -58,11 +58,11 @@ def run(quick: bool) -> Section:
             sum(path.stat().st_size for path in out.glob(f"logs/*/{kind}-*.parquet")) for kind in ("pieces", "windows")
         )
         fitted, swept = [], []
-        for _ in range(3):
+        for _ in range(1 if quick else 3):
             fitted.append(whole_process((*FIT, "--out", folder)))
             swept.append(whole_process((*SWEEP, "--out", folder)))
         weak, weak_peak = whole_process((*WEAK, "--out", folder))
-        read = [_one_pass(rows) for _ in range(3)]
+        read = [_one_pass(rows) for _ in fitted]
     peak = max(memory for _, memory in (*fitted, *swept))
     table = [
         faster_row(
@@ -88,7 +88,7 @@ def run(quick: bool) -> Section:
     ]
     start_up, same = _start_up(3 if quick else 15)
     with tempfile.TemporaryDirectory() as folder:
-        rows = [*table, *_batch(2 if quick else BATCH_LOGS, Path(folder)), *start_up]
+        rows = [*table, *_batch(1 if quick else BATCH_LOGS, Path(folder)), *start_up]
     return Section(
         "Archive and start-up",
         rows,

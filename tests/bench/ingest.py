@@ -135,7 +135,7 @@ def against_rosbags(folder: Path, short: float, long: float) -> list[Row]:
     """
     rival_s = {
         kind: statistics.median(seconds(lambda log=log: by_rosbags(log)) for _ in range(3))
-        for kind, compression in dict(PLAIN).items()
+        for kind, compression in dict(reversed(PLAIN)).items()
         for log in (logs.log(folder, kind, compression, short),)
     }
     rows = []
@@ -297,7 +297,7 @@ def rival_process(log: Path, before: str = "", code: str = THEIRS) -> str:
         return script(before + code, log, out)
 
 
-def as_process(folder: Path, minutes: float) -> list[Row]:
+def as_process(folder: Path, minutes: float, repeats: int) -> list[Row]:
     """One whole process, start-up included; where they are installed, against the fastest readers in Python as well."""
     rows = [
         faster(
@@ -306,7 +306,7 @@ def as_process(folder: Path, minutes: float) -> list[Row]:
             "rosbags and pandas in a process",
             lambda log=log: rival_process(log),
             8.0,
-            3,
+            repeats,
         )
         for kind, compression in (("mcap", "zstd"), ("bag", "lz4"), ("db3", "none"))
         for log in (logs.log(folder, kind, compression, minutes),)
@@ -322,7 +322,7 @@ def as_process(folder: Path, minutes: float) -> list[Row]:
                 f"small-mcap with mcap-ros2-support-fast and pandas, {told}",
                 lambda code=code: rival_process(log, code=code),
                 1.0,
-                3,
+                repeats,
             )
         )
     return rows
@@ -363,7 +363,7 @@ def run(quick: bool, folder: Path | None = None) -> Section:
     rows += least
     rows += against_whole_camera_log(folder, camera)
     rows += against_rerun(folder, short)
-    rows += as_process(folder, short)
+    rows += as_process(folder, short, 1 if quick else 3)
     rows += memory(folder, long)
     with scratch() as first, scratch() as second:
         words = [
