@@ -43,7 +43,7 @@ def run(quick: bool) -> Section:
             _row("ferryid fit, 24 min, with its report", _fits(folder, trial, (), repeats), 1.5),
             _row("ferryid fit --no-report, 24 min", _fits(folder, trial, ("--no-report",), repeats), 0.8),
             _row("ferryid simulate, 12 min", _times([("simulate", str(scenario), *log)] * (repeats + 1))[1:], 1.0),
-            *_compiled(folder, scenario),
+            *([] if quick else _compiled(folder, scenario)),
         ]
         resume = _resumable(folder / "batch", logs)
         rows.append(_row(f"ferryid batch, {logs} logs and nothing to do", _times([resume] * repeats), 5.0))
