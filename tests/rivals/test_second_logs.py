@@ -51,5 +51,11 @@ def test_the_table_has_every_model() -> None:
 
 
 def test_the_draw_is_the_same_every_time() -> None:
-    assert [one.name for one in cases()[:3]] == ["000", "001", "002"]
+    names = [one.name for one in cases()]
+    cases.cache_clear()
+    assert [one.name for one in cases()] == names == sorted(set(names))
     assert len({one.cell for one in cases()[:20]}) > 10
+
+
+def test_every_case_is_one_log_that_a_rival_can_learn_from() -> None:
+    assert {case.logs for case in cases()} == {1}
