@@ -114,7 +114,12 @@ class Part:
         far = Share(sum(one.count for one in twice), sum(one.of for one in twice))
         said = (
             f"{counted(scores.runs, 'trial')}, {clean} of them without an effect",
-            f"{whole.text} of all sizes, invisible ones among them; {far.text} from twice the oracle's size on",
+            f"{whole.text} of all sizes, invisible ones among them; "
+            + (
+                f"{far.text} from twice the oracle's size on"
+                if far.of
+                else "what the oracle needs is not known, as it sees what so few sizes show"
+            ),
             f"a name that is not in the trial in {scores.false_names['all'].text}",
             ON_TRIALS,
             _sources(result),
