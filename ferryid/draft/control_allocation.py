@@ -15,6 +15,8 @@ from ferryid.draft.autopilot_parameters import NOT_STATED, Placement, UsedValues
 
 _FIXED = {5: "Rover (Ackermann)", 6: "Rover (Differential)", 13: "Rover (Mecanum)"}
 """CA_AIRFRAME of vehicles whose places of motors PX4 does not ask for: what stands in the parameters means nothing."""
+_MOST = 12
+"""Rotors that PX4 has parameters of."""
 _RUDDERS = {4: "Rudder", 16: "Steering Wheel"}
 """CA_SV_CSn_TYPE of what steers."""
 
@@ -67,7 +69,7 @@ def rotor_placements(
 def _counted(motors: Sequence[str], count: int) -> list[str]:
     """Return how the motors that change contradict the number that is stated."""
     numbers = {int(name.removeprefix("motor")) for name in motors}
-    still = [k for k in range(1, count + 1) if k not in numbers]
+    still = [k for k in range(1, min(count, _MOST) + 1) if k not in numbers]
     beyond = sorted(number for number in numbers if number > count)
     return [
         *(f"CA_ROTOR_COUNT = {count}, but the order of motor {k} never changes: it is not mapped" for k in still),

@@ -191,14 +191,16 @@ def _omni(motor: int, values: UsedValues) -> Placement:
     if angle == 90.0:
         return Placement("tunnel", None, (2.0 * turns, 0.0), None, turns, evidence=evidence)
     doubts = ("angle_deg is that of the autopilot's mix: measure where the thruster pushes to",) if angle else ()
-    return Placement("propeller", None, (-2.0, 0.0), angle, turns, evidence=evidence, doubts=doubts)
+    # One that pushes to port turns the vessel to port at the bow, and to starboard at the stern.
+    hint_m = (2.0 * turns * aside or -2.0, 0.0)
+    return Placement("propeller", None, hint_m, angle, turns, evidence=evidence, doubts=doubts)
 
 
 def _steering(output: _Output, values: UsedValues, samples: Samples) -> list[ActuatorField]:
     """Return the steering of the vessel's one throttle: a rudder, or the angle of a thruster that turns."""
     setting = _setting(output, values, samples, thruster=False)
     most = values.get("MOT_VEC_ANGLEMAX")
-    if most:
+    if most is not None and most > 0.0:
         vectored = f"MOT_VEC_ANGLEMAX = {most:g} deg: it turns the thruster"
         setting = replace(
             setting,

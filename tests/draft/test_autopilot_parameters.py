@@ -126,6 +126,13 @@ def test_a_thruster_that_is_turned_is_an_azimuth(trial: Columns, tmp_path: Path)
     np.testing.assert_allclose(columns_of(tmp_path, draft)["alpha_cmd_propeller"], expected, atol=2e-3)
 
 
+def test_a_negative_angle_of_vectored_thrust_is_none(trial: Columns, tmp_path: Path) -> None:
+    stated = BOAT | RUDDER | PROPELLER | {"MOT_VEC_ANGLEMAX": -30.0}
+    draft = drafted(tmp_path, ardupilot(trial, stated, both(trial, stated)))
+    assert [one.kind for one in draft.actuators] == ["propeller_rudder"]
+    parse_profile(text_of(draft), "boat.toml")
+
+
 def test_motors_of_a_vessel_that_pushes_aside(trial: Columns, tmp_path: Path) -> None:
     stated = BOAT | {"FRAME_TYPE": 3.0}
     for motor in range(4):
@@ -141,6 +148,9 @@ def test_motors_of_a_vessel_that_pushes_aside(trial: Columns, tmp_path: Path) ->
     assert [one.placement.angle_deg for one in draft.actuators] == [-45.0, 45.0, -45.0, 45.0]
     assert "angle_deg = -45    #" in text_of(draft)
     assert "measure where the thruster pushes to" in doubts(draft)
+    # The places that are suggested turn the vessel the way in which the autopilot takes each motor to.
+    assert [one.placement.hint_m[0] for one in draft.actuators] == [2.0, -2.0, -2.0, 2.0]
+    assert "at this place" not in text_of(draft)
     stated["FRAME_TYPE"] = 0.0
     assert "FRAME_TYPE does not state it" in doubts(drafted(tmp_path, ardupilot(trial, stated, outputs)))
 
@@ -301,6 +311,13 @@ def test_rotors_of_px4_that_contradict_the_log(
     draft = drafted(tmp_path, px4(trial, parameters=stated | changes, motors=orders, servos={}), "boat.ulg")
     assert told in doubts(draft)
     assert told in text_of(draft)
+
+
+def test_a_number_of_rotors_that_px4_cannot_have_is_not_counted_through(trial: Columns, tmp_path: Path) -> None:
+    stated: dict[str, float] = {"CA_AIRFRAME": 9, "CA_ROTOR_COUNT": 100_000}
+    draft = drafted(tmp_path, px4(trial, parameters=stated, servos={}), "boat.ulg")
+    assert len(draft.remarks) == 11
+    assert "CA_ROTOR_COUNT = 100000, but the order of motor 12 never changes" in draft.remarks[-1]
 
 
 def test_a_motor_of_px4_that_a_servo_turns_is_no_tunnel_thruster(trial: Columns, tmp_path: Path) -> None:
