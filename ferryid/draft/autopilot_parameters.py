@@ -10,6 +10,9 @@ import numpy as np
 from ferryid.draft.samples import Samples
 from ferryid.ingest.parameters import Parameter
 
+SHOWN_CHANGES = 5
+"""Values that are listed of a parameter that changes in a log."""
+
 
 @dataclass(frozen=True)
 class OutputSetting:
@@ -108,11 +111,18 @@ class UsedValues:
         used = float(max(values, key=lambda value: np.count_nonzero(held == value)))
         changes = [k for k in range(len(order)) if k == 0 or one.values[order[k]] != one.values[order[k - 1]]]
         shown = [f"{one.values[order[0]]:g} at first"]
-        shown += [f"{one.values[order[k]]:g} from {max(set_s[order[k]], 0.0):.1f} s on" for k in changes[1:]]
+        shown += [
+            f"{one.values[order[k]]:g} from {max(set_s[order[k]], 0.0):.1f} s on" for k in changes[1:SHOWN_CHANGES]
+        ]
+        if len(changes) > SHOWN_CHANGES:
+            shown.append(f"{len(changes) - SHOWN_CHANGES} more")
         self.remarks[name] = f"{name} changed in the log: {', '.join(shown)}; {used:g} held longest and is used"
         return used
 
     def whole(self, name: str) -> int | None:
-        """Return the value of a parameter that is a whole number, None where the log does not have it."""
+        """Return the value of a parameter that is a whole number, None where the log does not have it, or another one."""
         value = self.get(name)
+        if value is not None and value != round(value):
+            self.remarks[name] = f"{name} = {value:g} is no whole number, and is not used"
+            return None
         return None if value is None else round(value)

@@ -6,7 +6,7 @@ libraries/AR_Motors/AP_MotorsUGV.cpp.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import atan2, degrees
 
@@ -19,6 +19,8 @@ from ferryid.vessel.pulses import PULSE_LIMITS_US
 
 _STEERING, _THROTTLE, _LEFT, _RIGHT = 26, 70, 73, 74
 _MOTORS = range(33, 41)
+_OUTPUTS = 32
+"""Outputs that ArduPilot has at most."""
 _BOAT = 2
 """FRAME_CLASS of a boat."""
 _RELAY = 3
@@ -84,8 +86,8 @@ def configured_outputs(
             outputs.append(_Output(number, function, field, _moves(field, samples)))
     if not outputs:
         return None
-    remarks = _frame(values)
     driven = {_STEERING, _THROTTLE, _LEFT, _RIGHT, *_MOTORS}
+    remarks = [*_frame(values), *_not_recorded({one.number for one in outputs}, driven, values)]
     chosen: dict[int, tuple[_Output, int]] = {}
     for function in sorted(driven, key=lambda one: (one == _STEERING, one)):
         same = [one for one in outputs if one.function == function]
@@ -111,6 +113,10 @@ def configured_outputs(
                 f"{steering.stated} without a Throttle (70): which thruster it turns, or whether it is a rudder, is not "
                 f"stated, and {steering.field.path} is not mapped"
             )
+    for function, other in ((_LEFT, _RIGHT), (_RIGHT, _LEFT)):
+        if function in chosen and other not in chosen:
+            stated = chosen[function][0].stated
+            remarks.append(f"{stated} alone: no output that changes has the function {other} ({_NAMES[other]})")
     rest = [one for one in outputs if one.moves and one.function not in driven]
     driving = bool(found)
     for one in rest:
@@ -122,6 +128,16 @@ def configured_outputs(
             remarks.append(f"{one.stated}, yet {one.field.path} changes: it is not mapped")
     found += [field for field in others if _moves(field, samples)]
     return ConfiguredOutputs(tuple(found), placements, (*remarks, *values.remarks.values()))
+
+
+def _not_recorded(recorded: Collection[int], driven: Collection[int], values: UsedValues) -> list[str]:
+    """Return the outputs that drive the vessel and of which the log has no pulses, a sentence each."""
+    found = []
+    for number in sorted(set(range(1, _OUTPUTS + 1)) - set(recorded)):
+        function = values.whole(f"SERVO{number}_FUNCTION")
+        if function is not None and function in driven:
+            found.append(f"SERVO{number}_FUNCTION = {function} ({_NAMES[function]}), but the log has no C{number}")
+    return found
 
 
 def _moves(field: ActuatorField, samples: Samples) -> bool:

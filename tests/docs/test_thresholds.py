@@ -152,6 +152,9 @@ NO_DECISION = {
         signals.render _FIELDS_SHOWN
         draft.samples MOST_ROWS
         draft.autopilots _MOST
+        draft.control_allocation _MOST
+        draft.servo_functions _OUTPUTS
+        draft.autopilot_parameters SHOWN_CHANGES
         draft.actuator_fields _MOST_SHARED
         diagnose.inference.folds DRAWS
         diagnose.inference.onset_estimation MOST_VALUES

@@ -168,6 +168,9 @@ def test_motors_of_a_vessel_that_pushes_aside(trial: Columns, tmp_path: Path) ->
         ({"MOT_PWM_TYPE": 3.0}, "MOT_PWM_TYPE = 3: a relay decides whether it pushes ahead or astern"),
         ({"MOT_THR_MIN": 8.0}, "dead_band_us is where the speed controller does nothing"),
         (servo(2, 70, 1100, 1500, 1900), "SERVO2_FUNCTION = 70 \\(Throttle\\), but C2 of /RCOU never changes"),
+        (servo(9, 70, 1100, 1500, 1900), "SERVO9_FUNCTION = 70 \\(Throttle\\), but the log has no C9"),
+        ({"SERVO3_FUNCTION": 73.5}, "SERVO3_FUNCTION = 73.5 is no whole number, and is not used"),
+        ({"SERVO3_FUNCTION": 73.0}, "73 \\(ThrottleLeft\\) alone: no output that changes has the function 74"),
         ({"SERVO3_FUNCTION": 73.0}, "without a Throttle \\(70\\): .*C1 is not mapped"),
         ({"SERVO1_FUNCTION": 0.0}, "SERVO1_FUNCTION = 0 \\(Disabled\\), yet C1 changes: it is not mapped"),
         ({"SERVO1_FUNCTION": 89.0}, "SERVO1_FUNCTION = 89 \\(MainSail\\), yet C1 changes: it is not mapped"),
@@ -223,6 +226,13 @@ def test_a_motor_that_runs_one_way_backwards(trial: Columns, tmp_path: Path) -> 
     outputs = both(trial, RUDDER | PROPELLER) | {3: 1900.0 - 0.8 * trial["n"]}
     draft = drafted(tmp_path, ardupilot(trial, stated, outputs))
     np.testing.assert_allclose(columns_of(tmp_path, draft)["n_cmd_propeller"], trial["n"], atol=1.3)
+
+
+def test_of_a_parameter_that_changes_often_the_first_values_are_listed(trial: Columns, tmp_path: Path) -> None:
+    stated = BOAT | RUDDER | PROPELLER
+    often = tuple((0.1 * k, "SERVO3_TRIM", 1480.0 + k) for k in range(1, 9))
+    draft = drafted(tmp_path, ardupilot(trial, stated, both(trial, stated), often))
+    assert "1484 from 0.4 s on, 4 more; 1488 held longest" in doubts(draft)
 
 
 def test_of_a_parameter_that_changes_the_value_that_held_longest_is_used(trial: Columns, tmp_path: Path) -> None:
