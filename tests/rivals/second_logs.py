@@ -6,6 +6,7 @@ does not have, a hull that is wrong by some per cent. All learn from the first l
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
@@ -55,6 +56,8 @@ def cases() -> tuple[Case, ...]:
 def try_case(case: Case, folder: Path) -> dict[str, Any]:
     """Return the scores of all models on the second log of a case, as plain values."""
     place = folder / case.name
+    # What a run that was ended has left there is not written over.
+    shutil.rmtree(place, ignore_errors=True)
     first, second = generate(case, place), generate(case, place / "second", transfer=True)
     out = place / "out"
     diagnosis = diagnose_log(first.log, first.profile, out)

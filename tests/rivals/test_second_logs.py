@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from ferryid.validation.records import DIAGNOSED, TransferResult, TransferScore
+from tests.rivals import second_logs
 from tests.rivals.second_logs import FIT, cases, force_error, position_error, section, targets
 
 
@@ -59,3 +61,19 @@ def test_the_draw_is_the_same_every_time() -> None:
 
 def test_every_case_is_one_log_that_a_rival_can_learn_from() -> None:
     assert {case.logs for case in cases()} == {1}
+
+
+def test_what_an_ended_run_has_left_of_a_case_is_in_nobodys_way(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    case, left = cases()[0], []
+    (tmp_path / case.name / case.name).mkdir(parents=True)
+
+    def generate(one: Any, place: Path, *, transfer: bool = False) -> None:
+        left.append(place.exists())
+        raise InterruptedError
+
+    monkeypatch.setattr(second_logs, "generate", generate)
+    with pytest.raises(InterruptedError):
+        second_logs.try_case(case, tmp_path)
+    assert left == [False]
