@@ -28,7 +28,7 @@ from ferryid.signals import cache, recording
 from ferryid.signals.recording import log_name, read_recording, record
 from ferryid.vessel import load_profile
 from tests.bench import logs, rivals
-from tests.bench.page import Row, Section, duration, faster, faster_row, in_turn, seconds
+from tests.bench.page import Row, Section, duration, faster, faster_row, in_turn
 from tests.bench.processes import floor
 
 PROFILE = Path(__file__).with_name("bench.toml")
@@ -130,13 +130,11 @@ def parquet_of(log: Path) -> Callable[[], None]:
 def against_rosbags(folder: Path, short: float, long: float) -> list[Row]:
     """Log → Parquet, without the content hash, which the rival does not make, and with it.
 
-    The rival is timed on the short log of each format: nearly all that it takes is deserialising, whatever the compression, and
-    grows with the number of messages.
+    The rival is timed on the short log of the same format in the same rounds, as a machine changes its speed within a run:
+    nearly all that it takes is deserialising, whatever the compression, and grows with the number of messages.
     """
-    rival_s = {
-        kind: statistics.median(seconds(lambda log=log: by_rosbags(log)) for _ in range(3))
-        for kind, compression in dict(reversed(PLAIN)).items()
-        for log in (logs.log(folder, kind, compression, short),)
+    rivals_logs = {
+        kind: logs.log(folder, kind, compression, short) for kind, compression in dict(reversed(PLAIN)).items()
     }
     rows = []
     for minutes in dict.fromkeys((short, long)):
@@ -145,9 +143,13 @@ def against_rosbags(folder: Path, short: float, long: float) -> list[Row]:
             goal = None if minutes < 120 else 15.0 if kind == "db3" else 35.0
             what = f"{minutes:g} min {NAMES[kind]} {compression}: log → Parquet"
             columns(log)
-            works = [lambda log=log: columns_to_parquet(log), lambda log=log: ingest(log)]
-            bare, whole = in_turn(works, 3 if minutes == long else 5)
-            theirs = len(bare) * [rival_s[kind] * minutes / short]
+            works = [
+                lambda log=log: columns_to_parquet(log),
+                lambda log=log: ingest(log),
+                lambda log=rivals_logs[kind]: by_rosbags(log),
+            ]
+            bare, whole, of_short = in_turn(works, 3)
+            theirs = [took * minutes / short for took in of_short]
             rows.append(faster_row(what, bare, ROSBAGS, theirs, goal))
             rows.append(faster_row(f"{what}, with content hash", whole, ROSBAGS, theirs, None))
     return rows
@@ -379,7 +381,7 @@ def run(quick: bool, folder: Path | None = None) -> Section:
             "of the first, orientation of the second, thruster and wind. Written by rosbags (ROS1, db3) and mcap.",
             "Log → Parquet is reading, clocks, units and Parquet with metadata; the rival deserialises the same topics and "
             "writes the same fields. `ferryid ingest` also hashes the log, in a thread beside; so do the whole processes. "
-            f"The rival is timed on the log of {short:g} min of each format, and its time multiplied for that of {long:g} min.",
+            f"The rival is timed on the log of {short:g} min of each format in the same rounds, and multiplied for {long:g}.",
             *between_notes,
             process_note,
             f"Logs with camera hold raw 1280 x 720 pictures at {logs.CAMERA_HZ:g} Hz, {camera:g} minutes, about "
