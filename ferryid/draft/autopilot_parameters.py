@@ -101,7 +101,13 @@ class UsedValues:
         one = self.parameters.get(name)
         if one is None:
             return None
+        known = np.isfinite(one.values)
+        if not known.all():
+            self.remarks[f"{name}, no number"] = f"{name} is no number in the log: such values are not used"
+            one = Parameter(one.time_ns[known], one.values[known])
         values = np.unique(one.values)
+        if not values.size:
+            return None
         if values.size == 1:
             return float(values[0])
         grid = self.samples.grid_s if self.samples.used is None else self.samples.grid_s[self.samples.used]

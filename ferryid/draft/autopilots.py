@@ -105,6 +105,12 @@ def orders(fields: Sequence[ActuatorField], samples: Samples, parameters: Mappin
         for one in chosen
     ]
     placements, remarks = rotor_placements([one.actuator for one in chosen if one not in rudders], fields, values)
+    mapped = {one.path for one in chosen if one.role in ("rudder", "angle")}
+    remarks += [
+        f"{stated}, but {one.path} of {one.topic} is not mapped: it never changes, or the motor before it is not stated"
+        for one in fields
+        if (stated := rudder_evidence(one, values)) and one.path not in mapped
+    ]
     return Orders(tuple(chosen), placements, tuple(remarks))
 
 

@@ -21,7 +21,7 @@ class Parameter:
     time_ns
         When each was written [ns], on the clock of the topics, shape (n,).
     values
-        The values, shape (n,), n at least one.
+        The values, shape (n,), n at least one; NaN or infinite where the log has no number.
     """
 
     time_ns: Nanoseconds
@@ -47,7 +47,7 @@ def gathered(names: Sequence[str], time_ns: Nanoseconds, values: Floats) -> dict
     """Return parameters by name from rows of a log: names, times [ns] and values, shape (n,)."""
     rows: dict[str, list[int]] = {}
     for row, name in enumerate(names):
-        if name and np.isfinite(values[row]):
+        if name:
             rows.setdefault(name, []).append(row)
     return {name: Parameter(time_ns[chosen], values[chosen]) for name, chosen in rows.items()}
 

@@ -169,6 +169,7 @@ def test_motors_of_a_vessel_that_pushes_aside(trial: Columns, tmp_path: Path) ->
         ({"MOT_THR_MIN": 8.0}, "dead_band_us is where the speed controller does nothing"),
         (servo(2, 70, 1100, 1500, 1900), "SERVO2_FUNCTION = 70 \\(Throttle\\), but C2 of /RCOU never changes"),
         (servo(9, 70, 1100, 1500, 1900), "SERVO9_FUNCTION = 70 \\(Throttle\\), but the log has no C9"),
+        ({"SERVO1_REVERSED": float("nan")}, "SERVO1_REVERSED is no number in the log: such values are not used"),
         ({"SERVO3_FUNCTION": 73.5}, "SERVO3_FUNCTION = 73.5 is no whole number, and is not used"),
         ({"SERVO3_FUNCTION": 73.0}, "73 \\(ThrottleLeft\\) alone: no output that changes has the function 74"),
         ({"SERVO3_FUNCTION": 73.0}, "without a Throttle \\(70\\): .*C1 is not mapped"),
@@ -350,3 +351,11 @@ def test_the_servo_of_px4_that_is_a_rudder(trial: Columns, tmp_path: Path) -> No
     rudder = next(one for one in draft.every if one.quantity == "motor1.rudder.command")
     assert rudder.fields == ("control[1]",)
     assert "CA_SV_CS1_TYPE = 4 (Rudder)" in rudder.evidence
+
+
+def test_rudders_of_px4_that_have_no_motor_of_their_own_are_named(trial: Columns, tmp_path: Path) -> None:
+    servos = {"1": trial["rudder"], "2": -trial["rudder"]}
+    stated: dict[str, float] = {"CA_SV_CS0_TYPE": 4, "CA_SV_CS1_TYPE": 4}
+    draft = drafted(tmp_path, px4(trial, servos=servos, parameters=stated), "boat.ulg")
+    assert [one.kind for one in draft.actuators] == ["propeller"]
+    assert [one.partition(",")[0] for one in draft.remarks] == [f"CA_SV_CS{k}_TYPE = 4 (Rudder)" for k in range(2)]

@@ -156,8 +156,11 @@ def test_a_log_that_is_cut_while_its_parameters_are_read(tmp_path: Path) -> None
         parameters_of(reader)
 
 
-def test_parameters_without_a_number_are_left_out(tmp_path: Path) -> None:
+def test_parameters_without_a_number_are_kept_and_those_without_a_name_are_not(tmp_path: Path) -> None:
     log = boat()
     log.add("PARM", 1_500_000, b"SERVO2_MIN", float("nan"))
     log.add("PARM", 1_500_000, b"", 3.0)
-    assert set(parameters_of(open_log(written(tmp_path, log.content)))) == {"SERVO1_MIN"}
+    found = parameters_of(open_log(written(tmp_path, log.content)))
+    assert set(found) == {"SERVO1_MIN", "SERVO2_MIN"}
+    # Who asks for it is to say so.
+    assert np.isnan(found["SERVO2_MIN"].values).tolist() == [True]
