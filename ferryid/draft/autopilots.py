@@ -21,10 +21,11 @@ _ORDERS = (
     ("actuator_servos", "control[{}]", 0, "servo", "rudder"),
     ("actuator_outputs", "output[{}]", 0, "output", "duty"),
     ("RCOU", "C{}", 1, "output", "duty"),
+    ("RCOU", "Ch{}", 1, "output", "duty"),
     ("RCO2", "C{}", 15, "output", "duty"),
     ("RCO3", "C{}", 19, "output", "duty"),
 )
-"""Topic, field, number of the first, name and role of what autopilots order."""
+"""Topic, field, number of the first, name and role of what autopilots order; Ch1 is the name of C1 up to 2014."""
 _MOST = 16
 
 

@@ -167,6 +167,12 @@ def _named_frame(pose: _Pose) -> str:
     return ""
 
 
+def _named_velocity_frame(velocity: FieldGroup) -> str:
+    """Return the frame of a world that the names of a velocity's components state, or an empty string."""
+    first, second = (words_of(path)[-1] for path in velocity.fields)
+    return "NED" if (first, second) in (("vn", "ve"), ("vnorth", "veast")) else ""
+
+
 def _poses(position: FieldGroup | None, heading: FieldGroup, samples: Samples) -> list[_Pose]:
     """Return a position and a heading in every frame that they may be in."""
     unit = "quaternion" if heading.form else _angle_unit(heading, samples)
@@ -217,7 +223,8 @@ def _agreement(pose: _Pose, velocity: FieldGroup | None, samples: Samples) -> _A
         return _Agreement(_along(pose), "", 1.0, 0.0, None, pose)
     first, second = (_smoothed(samples, velocity, place) for place in (0, 1))
     ahead, aside = to_body(pose.north, pose.east, pose.psi)
-    best = _Agreement(-1.0, "FRD", 1.0, 0.0, velocity, pose)
+    named = _named_velocity_frame(velocity) or "FRD"
+    best = _Agreement(-1.0, named, 1.0, 0.0, velocity, pose)
     for frame in (*_BODY, *_WORLD):
         x, y = (ahead, aside) if frame in _BODY else (pose.north, pose.east)
         x, y = {"FLU": (x, -y), "ENU": (y, x)}.get(frame, (x, y))
@@ -225,7 +232,7 @@ def _agreement(pose: _Pose, velocity: FieldGroup | None, samples: Samples) -> _A
         if share > best.share + (DRAFT.even if frame in _WORLD or frame == "FLU" else 0.0):
             best = _Agreement(share, frame, gain, sway, velocity, pose)
     if pose.position is None:
-        return _Agreement(0.0, "FRD", 1.0, 0.0, velocity, pose)
+        return _Agreement(0.0, named, 1.0, 0.0, velocity, pose)
     return best
 
 
@@ -393,7 +400,9 @@ def _velocity(velocity: FieldGroup, chosen: _Agreement, others: Sequence[str]) -
         )
     if chosen.pose.position is None:
         evidence = "no position to compare it with"
-        doubts.append("unit and frame are assumed")
+        named = _named_velocity_frame(velocity)
+        evidence += f"; {named} by the names of its components" if named else ""
+        doubts.append("its unit is assumed" if named else "unit and frame are assumed")
     elif abs(log(max(left, 1e-3))) > DRAFT.gain:
         doubts.append(f"it is {left:.2f} times the position's slope, which no unit explains")
     if chosen.frame in _BODY and abs(chosen.sway) < DRAFT.seen:

@@ -79,8 +79,14 @@ def ardupilot(
     parameters: dict[str, float] | None = None,
     outputs: dict[int, np.ndarray] | None = None,
     changed: tuple[tuple[float, str, float], ...] = (),
+    *,
+    channel: str = "C",
+    located: bool = True,
 ) -> bytes:
-    """A log of ArduPilot; `outputs` are pulses by channel, `changed` are parameters that change: time [s], name, value."""
+    """A log of ArduPilot; `outputs` are pulses by channel, `changed` are parameters that change: time [s], name, value.
+
+    `channel` begins the names of outputs; a vessel that is not `located` knows no position.
+    """
     if outputs is None:
         outputs = {1: 1500 + 500 * trial["rudder"], 3: 1500 + 0.3 * trial["n"]}
     messages = {"RCOU": range(1, min(max(outputs), 14) + 1), "RCO2": range(15, max(outputs) + 1)}
@@ -92,7 +98,7 @@ def ardupilot(
     log.define("XKF1", "QBCffff", "TimeUS,C,Yaw,VN,VE,PN,PE")
     log.define("IMU", "QBfff", "TimeUS,I,GyrX,GyrY,GyrZ")
     for name, channels in messages.items():
-        log.define(name, "Q" + "H" * len(channels), ",".join(["TimeUS", *(f"C{k}" for k in channels)]))
+        log.define(name, "Q" + "H" * len(channels), ",".join(["TimeUS", *(f"{channel}{k}" for k in channels)]))
     for name in ("XKF1", "IMU", "GPS"):
         log.units(name, "s#---")
     rows: list[tuple[Any, ...]] = []
@@ -103,11 +109,12 @@ def ardupilot(
         for name, channels in messages.items():
             if channels:
                 rows.append((name, t, *(int(outputs[one][k]) if one in outputs else 0 for one in channels)))
-        rows += [("XKF1", t, core, yaw, one["vn"], one["ve"], one["N"], one["E"]) for core in (0, 1)]
+        place = (one["N"], one["E"]) if located else (0.0, 0.0)
+        rows += [("XKF1", t, core, yaw, one["vn"], one["ve"], *place) for core in (0, 1)]
         rows.append(("IMU", t, 0, 0.0, 0.0, one["r"]))
-        if k % 2 == 0:
-            place = (int(one["lat"] * 1e7), int(one["lon"] * 1e7))
-            rows.append(("GPS", t, 0, 3, 345_600_000 + t // 1000, 2300, *place, np.hypot(one["vn"], one["ve"]), 0.0))
+        if located and k % 2 == 0:
+            degrees = (int(one["lat"] * 1e7), int(one["lon"] * 1e7))
+            rows.append(("GPS", t, 0, 3, 345_600_000 + t // 1000, 2300, *degrees, np.hypot(one["vn"], one["ve"]), 0.0))
     rows += [("PARM", int(at * 1e6), name.encode(), value, 0.0) for at, name, value in changed]
     log.table(rows)
     return log.content
@@ -159,6 +166,20 @@ def test_a_draft_from_ardupilot(trial: Columns, tmp_path: Path) -> None:
         "output3.speed.command": ("/RCOU", ("C3",), "us", ""),
     }
     assert all(any("drives" in doubt for doubt in one.signals[0].doubts) for one in draft.actuators)
+
+
+def test_a_velocity_without_a_position_is_over_ground_by_its_names(trial: Columns, tmp_path: Path) -> None:
+    (tmp_path / "boat.bin").write_bytes(ardupilot(trial, located=False))
+    draft = draft_profile(tmp_path / "boat.bin")
+    assert "position" not in shown(draft)
+    assert shown(draft)["velocity"] == ("/XKF1", ("VN", "VE"), "m/s", "NED")
+    assert next(one.doubts for one in draft.signals if one.quantity == "velocity") == ("its unit is assumed",)
+
+
+def test_outputs_are_found_by_their_names_of_2014(trial: Columns, tmp_path: Path) -> None:
+    (tmp_path / "boat.bin").write_bytes(ardupilot(trial, channel="Ch"))
+    fields = {name: one[1] for name, one in shown(draft_profile(tmp_path / "boat.bin")).items() if "output" in name}
+    assert fields == {"output1.speed.command": ("Ch1",), "output3.speed.command": ("Ch3",)}
 
 
 @pytest.mark.parametrize("name", ["boat.ulg", "boat.bin"])
