@@ -21,6 +21,7 @@ from ferryid.diagnose.judging.campaign_evidence import Gain, held_out_loss
 from ferryid.diagnose.judging.credibility import felt, unfelt, value_doubt
 from ferryid.diagnose.judging.experiment_design import manoeuvre
 from ferryid.diagnose.judging.finding import Finding, Rival
+from ferryid.diagnose.judging.rivals import same_curve
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.types import AXES, Floats
 
@@ -160,16 +161,9 @@ def tested(made: CampaignFit, candidate: Candidate, rivals: Sequence[TriedProper
         (sum(one > 0.0 for one in by_log), len(by_log)),
         np.asarray(1.0 - squares[1] / np.where(squares[0] > 0.0, squares[0], np.inf)),
         tuple(Rival(one.candidate.effect.id, one.candidate.instance, min(one.odds, 0.0)) for one in others),
-        tuple(one.candidate.effect.id for one in others if _same_curve(one, candidate)),
+        tuple(one.candidate.effect.id for one in others if same_curve(one.candidate, candidate, one.share)),
         _credibility(made, candidate, {one.name: at for one, at, _ in reported}),
     )
-
-
-def _same_curve(one: TriedProperty, candidate: Candidate) -> bool:
-    """Tell whether it is another shape of the same actuator's thrust curve that explains nearly as much."""
-    shapes = one.candidate.effect.of_thrust_curve and candidate.effect.of_thrust_curve
-    same = one.candidate.instance == candidate.instance
-    return shapes and same and one.share >= JUDGING.alike_shapes
 
 
 def _credibility(made: CampaignFit, candidate: Candidate, values: Mapping[str, float]) -> str:

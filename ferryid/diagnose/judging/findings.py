@@ -87,9 +87,7 @@ def _force_claim(
     rivals = tuple(
         Rival(one.candidate.effect.id, one.candidate.instance, one.gain) for one in standing.rivals[:SHOWN_RIVALS]
     )
-    unresolved = tuple(
-        dict.fromkeys(one.candidate.effect.id for one in standing.rivals if one.gain > -JUDGING.unresolved_evidence)
-    )
+    unresolved = standing.unresolved(candidate)
     # The hull stays as it is with the finding: refitted without, it would bend to it on axes where it does not act.
     bare = replace(
         kept,

@@ -53,10 +53,37 @@ class RivalComparison:
         The best first.
     probability
         Of the candidate, over its rivals and none of them.
+    evidence
+        Of the candidate over none of them [nat].
     """
 
     rivals: tuple[RivalFit, ...]
     probability: float
+    evidence: float = 0.0
+
+    def unresolved(self, candidate: Candidate) -> tuple[str, ...]:
+        """Return the ids of effects that cannot be told from a candidate: near in evidence, or another shape that is alike."""
+        names = [
+            one.candidate.effect.id
+            for one in self.rivals
+            if one.gain > -JUDGING.unresolved_evidence
+            or (self.evidence > 0.0 and same_curve(one.candidate, candidate, 1.0 + one.gain / self.evidence))
+        ]
+        return tuple(dict.fromkeys(names))
+
+
+def same_curve(one: Candidate, other: Candidate, share: float) -> bool:
+    """Tell whether it is another shape of the same actuator's thrust curve that explains nearly as much.
+
+    Parameters
+    ----------
+    one, other
+        Two candidates.
+    share
+        The evidence of the first over that of the other, each over none.
+    """
+    shapes = one.effect.of_thrust_curve and other.effect.of_thrust_curve
+    return shapes and one.instance == other.instance and share >= JUDGING.alike_shapes
 
 
 def compare_rivals(problem: EstimationProblem, kept: Fit, index: int, library: Sequence[Candidate]) -> RivalComparison:
@@ -68,7 +95,7 @@ def compare_rivals(problem: EstimationProblem, kept: Fit, index: int, library: S
     bare = without(problem, kept, index)
     none = exp(min(bare.evidence - kept.evidence + INFERENCE.prior_odds, 50.0))
     if is_brief(problem, candidate):
-        return RivalComparison((), 1.0 / (1.0 + none))
+        return RivalComparison((), 1.0 / (1.0 + none), kept.evidence - bare.evidence)
     begin = starting_point(problem, bare)
     taken = {one.key for one in kept.candidates}
 
@@ -106,7 +133,7 @@ def compare_rivals(problem: EstimationProblem, kept: Fit, index: int, library: S
     rivals[: JUDGING.fitted_rivals] = over(settled_in, rivals[: JUDGING.fitted_rivals])
     rivals.sort(key=lambda one: -one.gain)
     against = none + sum(exp(min(one.gain, 50.0)) for one in rivals)
-    return RivalComparison(tuple(rivals), 1.0 / (1.0 + against))
+    return RivalComparison(tuple(rivals), 1.0 / (1.0 + against), kept.evidence - bare.evidence)
 
 
 def _may_stand_in(
