@@ -223,7 +223,7 @@ def dispatcher_of(function: Callable[..., Any], *, inner: bool, options: dict[st
     options
         Of `numba.njit`.
     """
-    # Threads may run them side by side: see ferryid.diagnose.parallel. No function is passed by its address: see `callback`.
+    # Threads may run them side by side: see ferryid.side_by_side. No function is passed by its address: see `callback`.
     dispatcher = numba.njit(function, nogil=True, no_cfunc_wrapper=True, no_cpython_wrapper=inner, **options)
     if not numba.config.DISABLE_JIT:
         with suppress(RuntimeError, OSError):  # RuntimeError is numba's word for "no folder to keep it in"

@@ -45,12 +45,12 @@ def nobody_waits_for_the_disk() -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def one_thread_beside_another_worker() -> None:
-    """Keep diagnoses in this process to one thread where other workers have the other cores.
+    """Keep ingestion, fits and diagnoses in this process to one thread where other workers have the other cores.
 
     Threads on cores that are taken cost a fifth of a diagnosis. Commands and notebooks that tests start have theirs.
     """
     if WORKER:
-        from ferryid.diagnose.parallel import keep_to_one_thread
+        from ferryid.side_by_side import keep_to_one_thread
 
         keep_to_one_thread()
 

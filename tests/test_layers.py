@@ -20,6 +20,7 @@ ORDER = (
     "counts",
     "files",
     "interrupts",
+    "side_by_side",
     "compiler",
     "compiled",
     "lazy",

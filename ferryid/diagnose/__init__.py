@@ -11,7 +11,6 @@ from ferryid.diagnose.judging.group_differences import Difference
 from ferryid.diagnose.judging.likeness import Likeness, Pair, likeness_as_json, separation
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.judging.verdict import campaign_verdict, error_ratio, worse_axes
-from ferryid.diagnose.parallel import keep_to_one_thread
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose, diagnose_and_store
 from ferryid.diagnose.second_sources import Comparison, SecondSources
 from ferryid.diagnose.versus import Versus, compare_groups, versus_json
@@ -42,7 +41,6 @@ __all__ = [
     "diagnose_and_store",
     "error_ratio",
     "finding_as_json",
-    "keep_to_one_thread",
     "likeness_as_json",
     "separation",
     "to_json",

@@ -16,10 +16,10 @@ from ferryid.diagnose.inference.campaign import assemble, repeated
 from ferryid.diagnose.inference.stages import AveragedLog, average
 from ferryid.diagnose.judging.campaign_split import Split, find_split
 from ferryid.diagnose.judging.diagnosis import distinct
-from ferryid.diagnose.parallel import over
 from ferryid.effects.wording import listed
 from ferryid.errors import FerryIdError
 from ferryid.models import Model
+from ferryid.side_by_side import over
 from ferryid.types import RunContext
 from ferryid.vessel.profile import Profile
 

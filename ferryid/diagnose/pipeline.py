@@ -20,12 +20,12 @@ from ferryid.diagnose.judging.hidden_signal import with_gains
 from ferryid.diagnose.judging.judge import judge
 from ferryid.diagnose.judging.learning import Learner, without_withheld
 from ferryid.diagnose.judging.model_update import store_updated_model
-from ferryid.diagnose.parallel import over
 from ferryid.diagnose.second_sources import compare_second_sources
 from ferryid.effects.wording import listed
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.models import Model
 from ferryid.models.store import check_name
+from ferryid.side_by_side import over
 from ferryid.types import RunContext
 from ferryid.vessel.profile import SETTINGS, Profile
 

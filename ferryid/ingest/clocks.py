@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ferryid.counts import counted, verb
 from ferryid.ingest.log import Series
-from ferryid.ingest.side_by_side import of_each
+from ferryid.ingest.many_rows import of_each
 from ferryid.ingest.stamp_clock import CONSTANT_OFFSET_NS, SECOND_NS, STEP_NS, ClockFacts, compare_clocks, spread_sample
 from ferryid.ingest.stray_times import stray_times
 from ferryid.types import Nanoseconds

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import mmap
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -19,15 +18,15 @@ from ferryid.ingest.bulk import Decoder
 from ferryid.ingest.checksum import crc32
 from ferryid.ingest.formats.mcap import MAGIC
 from ferryid.ingest.log import Loss, Reader, Series, TableLayout, Topic
+from ferryid.ingest.many_rows import of_each
 from ferryid.ingest.mcap_batches import batches
 from ferryid.ingest.mcap_chunks import Loaded
 from ferryid.ingest.mcap_index import DATA_END, RECORD_HEADER, ExcessError, Messages, record_header
 from ferryid.ingest.mcap_recovery import read_index
 from ferryid.ingest.mcap_spans import spans
-from ferryid.ingest.side_by_side import Call, decode_together
 
-DECODERS = 1
-"""Threads that decode topics of a batch beside this one."""
+Call = tuple[Decoder, Any, Any, Any, Any]
+"""A decoder, and what its `add` takes: buffer, starts, sizes and receive times."""
 
 
 @dataclass(frozen=True)
@@ -159,17 +158,16 @@ class McapLog:
         groups, losses = self._groups(wanted)
         ids = [channel for group in groups for channel in group.channels]
         found = dict.fromkeys(ids, 0)
-        with ThreadPoolExecutor(DECODERS) as pool:
-            for loaded in self._loaded(ids, verify):
-                losses += loaded.losses
-                calls: list[Call] = []
-                for group in groups:
-                    messages = _merged([loaded.messages[key] for key in group.channels if key in loaded.messages])
-                    if messages is not None:
-                        calls.append((group.decoder, loaded.buffer, messages.starts, messages.sizes, messages.log_ns))
-                decode_together(pool, calls)
-                for key, messages in loaded.messages.items():
-                    found[key] += len(messages)
+        for loaded in self._loaded(ids, verify):
+            losses += loaded.losses
+            calls: list[Call] = []
+            for group in groups:
+                messages = _merged([loaded.messages[key] for key in group.channels if key in loaded.messages])
+                if messages is not None:
+                    calls.append((group.decoder, loaded.buffer, messages.starts, messages.sizes, messages.log_ns))
+            _decode_together(calls)
+            for key, messages in loaded.messages.items():
+                found[key] += len(messages)
         if verify:
             losses += self._data_checksum()
         # Topics that are not wanted have the messages that the index or a walk over their chunks shows.
@@ -292,6 +290,16 @@ def _definition(channel: Channel, schema: Schema | None) -> tuple[Any, ...]:
     if schema is None:
         return channel.message_encoding, channel.schema_id
     return channel.message_encoding, schema.name, schema.encoding, schema.data
+
+
+def _decode_together(calls: Sequence[Call]) -> None:
+    """Let every decoder take its messages of one batch; each is named once."""
+
+    def decode(call: Call) -> None:
+        decoder, *rest = call
+        decoder.add(*rest)
+
+    of_each(decode, calls, sum(len(starts) for _, _, starts, _, _ in calls))
 
 
 def _merged(parts: Sequence[Messages]) -> Messages | None:

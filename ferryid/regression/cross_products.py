@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +11,7 @@ from numpy.typing import NDArray
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 from ferryid.regression.thresholds import REGRESSION
+from ferryid.side_by_side import over
 from ferryid.types import Flags, Floats
 
 CHUNK_ROWS = 8192
@@ -206,15 +205,13 @@ class Accumulator:
     where
         What the rows belong to (a log's name), for messages.
     workers
-        Threads for long logs. The result does not depend on it.
+        Threads for long logs, where there are as many cores. The result does not depend on it.
     """
 
-    def __init__(
-        self, K: int, m: int, *, names: Sequence[str] = (), where: str = "fit", workers: int | None = None
-    ) -> None:
+    def __init__(self, K: int, m: int, *, names: Sequence[str] = (), where: str = "fit", workers: int = 4) -> None:
         self._K, self._m = K, m
         self._names, self._where = tuple(names), where
-        self._workers = workers or min(os.cpu_count() or 1, 4)
+        self._workers = workers
         self._n = 0
         self._shift: Floats | None = None
         self._products = np.zeros((K + m + 1, K + m + 1))
@@ -241,12 +238,8 @@ class Accumulator:
             return self._segment(rows, shift, low, min(low + SEGMENT_ROWS, len(rows.Y)))
 
         starts = range(0, len(rows.Y), SEGMENT_ROWS)
-        if len(starts) > 2 and self._workers > 1:
-            with ThreadPoolExecutor(self._workers) as pool:
-                sums = list(pool.map(segment, starts))
-        else:
-            sums = [segment(low) for low in starts]
-        for count, products in sums:
+        most = self._workers if len(starts) > 2 else 1
+        for count, products in over(segment, starts, most=most):
             self._n += count
             self._products += products
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,8 @@ from ferryid.files import remove_abandoned, replacing, write_text
 from ferryid.ingest.checksum import crc32
 from ferryid.ingest.clocks import ClockReport
 from ferryid.ingest.log import Loss, Topic
+from ferryid.ingest.many_rows import THREADS
+from ferryid.side_by_side import over
 from ferryid.signals.parquet import TIME_COLUMNS, read_table, table_checksum, unit_of, write_table
 from ferryid.signals.stream import Recording, Stream
 from ferryid.vessel.profile import Profile
@@ -225,8 +226,7 @@ def _write_streams(draft: Path, recording: Recording, tables: Mapping[str, str])
 
     # Largest first, so that two threads end together.
     ordered = sorted(recording.streams.values(), key=lambda one: -len(one.time_ns) * (2 + len(one.columns)))
-    with ThreadPoolExecutor(2) as pool:
-        list(pool.map(write, ordered))
+    over(write, ordered, most=THREADS)
 
 
 def load(folder: Path) -> Recording:
@@ -254,14 +254,8 @@ def load(folder: Path) -> Recording:
 
 def _recording(folder: Path, note: Mapping[str, Any]) -> Recording:
     plain, checksums = note["recording"], note["checksums"]
-    with ThreadPoolExecutor(2) as pool:
-        tables = dict(
-            zip(
-                note["tables"],
-                pool.map(lambda name: read_table(folder / name, checksums[name]), note["tables"].values()),
-                strict=True,
-            )
-        )
+    read = over(lambda name: read_table(folder / name, checksums[name]), note["tables"].values(), most=THREADS)
+    tables = dict(zip(note["tables"], read, strict=True))
     streams = {}
     for topic, (columns, _) in tables.items():
         time_ns = columns["time_ns"]

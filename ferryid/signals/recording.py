@@ -16,7 +16,7 @@ from ferryid.ingest import log_suffixes, open_log
 from ferryid.ingest.clocks import ClockReport, Rows, repair_all
 from ferryid.ingest.hashing import content_hash
 from ferryid.ingest.log import Reader, Series, Topic
-from ferryid.ingest.side_by_side import of_each
+from ferryid.ingest.many_rows import of_each
 from ferryid.signals import cache
 from ferryid.signals.data_quality import data_quality, grouped_notes, loss_sentence, main_loss
 from ferryid.signals.empty_streams import without_empty

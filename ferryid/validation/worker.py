@@ -18,8 +18,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from ferryid.diagnose import keep_to_one_thread
 from ferryid.errors import FerryIdError, UnwritableError, one_line
+from ferryid.side_by_side import keep_to_one_thread
 from ferryid.validation.records import Diagnosis
 from ferryid.validation.source_hash import source_hash
 

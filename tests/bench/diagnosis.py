@@ -40,7 +40,7 @@ SHOWN = 8
 PROFILE = """
 import cProfile, json, pstats, sys
 from ferryid import api
-from ferryid.diagnose.parallel import keep_to_one_thread
+from ferryid.side_by_side import keep_to_one_thread
 keep_to_one_thread()
 logs, out, stages = sys.argv[1].split(","), sys.argv[2], sys.argv[3].split(",")
 api.diagnose(logs, "milliampere", out)

@@ -9,7 +9,8 @@ from typing import Any
 
 import pytest
 
-from ferryid.diagnose import gathering, parallel
+from ferryid import side_by_side
+from ferryid.diagnose import gathering
 from ferryid.diagnose.gathering import Gathered, _clocks, gather, part, sort_out, whole, without_logs
 from ferryid.diagnose.inference.stages import AveragedLog
 from ferryid.effects.force_model import COEFFICIENTS
@@ -164,6 +165,6 @@ def test_logs_are_measured_side_by_side_and_stay_in_their_order(
         together.wait()
         return measure(path, *rest, **more)
 
-    monkeypatch.setattr(parallel, "_cores", lambda: 2)
+    monkeypatch.setattr(side_by_side, "usable_cores", lambda: 2)
     monkeypatch.setattr(gathering, "measure_log", met)
     assert [one.path for one in gather(days[:2], FERRY, IN_MEMORY).logs] == days[:2]

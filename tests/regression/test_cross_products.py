@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from ferryid import side_by_side
 from ferryid.errors import FerryIdError
 from ferryid.regression import cross_products
 from ferryid.regression.cross_products import Accumulator, CrossProducts, Rows
@@ -94,7 +95,8 @@ def test_chunks_layout_mask_and_evaluation_do_not_matter(kind, order: str, monke
             np.testing.assert_allclose(one, other, rtol=1e-12)
 
 
-def test_the_number_of_workers_changes_no_bit() -> None:
+def test_the_number_of_workers_changes_no_bit(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(side_by_side, "usable_cores", lambda: 3)
     X, Y = sample(3 * cross_products.SEGMENT_ROWS + 17, K=2, m=1)
     results = []
     for workers in (1, 2, 3):

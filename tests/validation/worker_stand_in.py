@@ -12,7 +12,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from ferryid.diagnose import parallel
+from ferryid import side_by_side
 from ferryid.validation import worker
 from ferryid.validation.records import Diagnosis
 
@@ -25,7 +25,7 @@ def report(log: Path, profile: Path, out: Path) -> Diagnosis:
         "command": sys.argv,
         "folder": os.getcwd(),
         "temporary": tempfile.gettempdir(),
-        "cores": parallel._cores(),
+        "cores": side_by_side.usable_cores(),
     }
     return Diagnosis("matched", 0.0, before=given)
 

@@ -25,9 +25,9 @@ from ferryid.diagnose.inference.campaign_estimation import CampaignFit
 from ferryid.diagnose.inference.campaign_model import DIFFERENCE_STEP
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
-from ferryid.diagnose.parallel import over
 from ferryid.effects.effect import Turbulence
 from ferryid.effects.force_model import as_measured
+from ferryid.side_by_side import over
 from ferryid.types import Floats
 
 KNOTS_A_MEMORY, MOST_KNOTS = 4.0, 200

@@ -32,8 +32,8 @@ from scipy.linalg import cho_factor, cho_solve
 from ferryid.diagnose.inference.campaign_model import Campaign, Spreads
 from ferryid.diagnose.inference.coloured_noise import ColouredNoise, Runs, fit_coloured_noise
 from ferryid.diagnose.inference.thresholds import INFERENCE
-from ferryid.diagnose.parallel import over
 from ferryid.effects.force_model import ForceModel
+from ferryid.side_by_side import over
 from ferryid.types import Floats
 
 ROUNDS = 20

@@ -22,8 +22,8 @@ from ferryid.diagnose.inference.campaign_estimation import CampaignFit, estimate
 from ferryid.diagnose.inference.campaign_model import DIFFERENCE_STEP, Campaign
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.thresholds import INFERENCE
-from ferryid.diagnose.parallel import over
 from ferryid.effects import effects
+from ferryid.side_by_side import over
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
 

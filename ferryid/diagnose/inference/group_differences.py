@@ -36,10 +36,10 @@ from ferryid.diagnose.inference.campaign_properties import (
 )
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.thresholds import INFERENCE
-from ferryid.diagnose.parallel import over
 from ferryid.effects import effects
 from ferryid.effects.effect import Effect
 from ferryid.effects.force_model import ForceModel
+from ferryid.side_by_side import over
 from ferryid.types import Floats
 
 GROUPS = ("A", "B")

@@ -20,9 +20,9 @@ from ferryid.diagnose.inference.noise_model import (
 )
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
-from ferryid.diagnose.parallel import over
 from ferryid.effects.effect import Process
 from ferryid.effects.force_model import ForceModel
+from ferryid.side_by_side import over
 from ferryid.types import Floats
 
 GROUPS = (0, 0, 1)

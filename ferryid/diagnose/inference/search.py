@@ -34,9 +34,9 @@ from ferryid.diagnose.inference.onset_estimation import (
 )
 from ferryid.diagnose.inference.stochastic_disturbance import DisturbanceState, fit_disturbances
 from ferryid.diagnose.inference.thresholds import INFERENCE
-from ferryid.diagnose.parallel import over
 from ferryid.effects import effects
 from ferryid.effects.force_model import Measurements
+from ferryid.side_by_side import over
 from ferryid.types import Floats
 
 COARSE_ITERATIONS = 8

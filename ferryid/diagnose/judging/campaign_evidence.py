@@ -24,8 +24,8 @@ from ferryid.diagnose.inference.folds import draws
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.thresholds import JUDGING
-from ferryid.diagnose.parallel import over
 from ferryid.effects.force_model import ForceModel
+from ferryid.side_by_side import over
 from ferryid.types import Floats, Ints
 
 MIRRORED, EXCHANGED = "the heading mirrored", "another log's heading"

@@ -23,7 +23,7 @@ from ferryid.diagnose.inference.campaign_estimation import CampaignFit, estimate
 from ferryid.diagnose.inference.campaign_model import Campaign
 from ferryid.diagnose.judging.campaign_evidence import Gain, held_out_blocks, without_conditions
 from ferryid.diagnose.judging.thresholds import JUDGING
-from ferryid.diagnose.parallel import over
+from ferryid.side_by_side import over
 from ferryid.types import Flags, Floats, Ints
 
 WEIGHED = 4

@@ -33,8 +33,8 @@ from ferryid.diagnose.judging.held_out import Proof
 from ferryid.diagnose.judging.locate import locate
 from ferryid.diagnose.judging.onset_evidence import sets_in
 from ferryid.diagnose.judging.thresholds import JUDGING
-from ferryid.diagnose.parallel import over
 from ferryid.effects.force_model import Measurements
+from ferryid.side_by_side import over
 from ferryid.types import AXES, Floats
 
 TIME_STEP, TIME_FIT = 0.125, 3

@@ -35,10 +35,10 @@ from ferryid.diagnose.judging.experiment_design import manoeuvre
 from ferryid.diagnose.judging.finding import Rival
 from ferryid.diagnose.judging.group_loads import LoadDifference, load_differences
 from ferryid.diagnose.judging.thresholds import JUDGING
-from ferryid.diagnose.parallel import over
 from ferryid.effects import effects
 from ferryid.effects.effect import Parameter
 from ferryid.effects.wording import listed
+from ferryid.side_by_side import over
 from ferryid.vessel.profile import Profile
 
 

@@ -32,9 +32,9 @@ from ferryid.diagnose.inference.force_errors import force_errors, mass_of
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.free_runs import FreeRuns, free_runs
 from ferryid.diagnose.judging.thresholds import JUDGING
-from ferryid.diagnose.parallel import over
 from ferryid.effects.effect import HELD
 from ferryid.effects.force_model import ForceModel, as_measured
+from ferryid.side_by_side import over
 from ferryid.types import Floats
 
 HEADING = "heading mirrored"

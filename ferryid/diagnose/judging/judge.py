@@ -18,8 +18,8 @@ from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.findings import force_claims
 from ferryid.diagnose.judging.signal_to_noise import velocity_noise_shares
 from ferryid.diagnose.judging.unexplained import Unexplained, find_unexplained
-from ferryid.diagnose.parallel import over
 from ferryid.effects import effects
+from ferryid.side_by_side import over
 from ferryid.types import AXES
 from ferryid.vessel.profile import Profile
 

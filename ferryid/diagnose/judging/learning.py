@@ -9,7 +9,6 @@ from math import isfinite, nan
 import numpy as np
 
 from ferryid.diagnose.judging.thresholds import JUDGING
-from ferryid.diagnose.parallel import over
 from ferryid.errors import FerryIdError
 from ferryid.identify import (
     Acceptance,
@@ -22,6 +21,7 @@ from ferryid.identify import (
     with_remainder,
 )
 from ferryid.models import ForceScores, Model, ModelScores, blank_model
+from ferryid.side_by_side import over
 from ferryid.types import AXES, Flags, Floats, RunContext, by_axis
 from ferryid.vessel.profile import Profile
 

@@ -21,7 +21,7 @@ from ferryid.diagnose.inference.onset_estimation import is_brief, linearise, pas
 from ferryid.diagnose.inference.search import COARSE_ITERATIONS
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.thresholds import JUDGING
-from ferryid.diagnose.parallel import over
+from ferryid.side_by_side import over
 
 
 @dataclass(frozen=True)

@@ -29,8 +29,8 @@ from ferryid.diagnose.judging.finding import UNKNOWN, Finding, LawTerm
 from ferryid.diagnose.judging.locate import Location, locate
 from ferryid.diagnose.judging.sparse_regression import Law, select_law
 from ferryid.diagnose.judging.thresholds import JUDGING
-from ferryid.diagnose.parallel import over
 from ferryid.effects.force_model import ForceModel, Measurements
+from ferryid.side_by_side import over
 from ferryid.types import AXES, Floats
 
 SPANS = 5

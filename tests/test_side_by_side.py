@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import multiprocessing.process
+import signal
+import subprocess
+import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
@@ -10,8 +14,8 @@ from threading import Barrier, get_ident
 
 import pytest
 
-from ferryid.diagnose import parallel
-from ferryid.diagnose.parallel import over
+from ferryid import side_by_side
+from ferryid.side_by_side import over
 
 CORES = 3
 
@@ -19,8 +23,8 @@ CORES = 3
 @pytest.fixture(autouse=True)
 def several(monkeypatch: pytest.MonkeyPatch) -> None:
     """Three cores, whatever machine this is and whatever runs beside."""
-    monkeypatch.setattr(parallel, "_alone", False)
-    monkeypatch.setattr(parallel.os, "sched_getaffinity", lambda pid: set(range(CORES)), raising=False)
+    monkeypatch.setattr(side_by_side, "_alone", False)
+    monkeypatch.setattr(side_by_side.os, "sched_getaffinity", lambda pid: set(range(CORES)), raising=False)
 
 
 @pytest.mark.slow
@@ -100,10 +104,50 @@ def test_calls_within_stay_on_the_thread_that_they_are_made_on() -> None:
     assert len({row[0] for row in rows}) == CORES
 
 
+def test_no_more_threads_than_are_of_use() -> None:
+    assert set(over(lambda k: get_ident(), range(50), most=1)) == {get_ident()}
+    together = Barrier(2, timeout=10.0)
+
+    def meet(k: int) -> int:
+        together.wait()
+        return get_ident()
+
+    assert len(set(over(meet, range(2 * CORES), most=2))) == 2
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there are no such signals")
+def test_what_has_begun_ends_before_an_interrupt_is_raised(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(side_by_side, "usable_cores", lambda: 2)
+    together, main, ended = Barrier(2, timeout=10.0), get_ident(), []
+
+    def item(k: int) -> None:
+        together.wait()
+        if get_ident() != main:
+            # The thread that asked has nothing left to do by the first sleep's end, and waits for this one.
+            time.sleep(0.1)
+            signal.pthread_kill(main, signal.SIGINT)
+            time.sleep(0.2)
+            ended.append(k)
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            over(item, range(2))
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert len(ended) == 1
+
+
+@pytest.mark.slow
+def test_multiprocessing_is_not_loaded_for_it() -> None:
+    code = "import sys; from ferryid.side_by_side import over; over(abs, range(4)); print('multiprocessing' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"
+
+
 @pytest.mark.slow
 def test_one_of_several_processes_uses_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
     with monkeypatch.context() as started:
-        started.setattr(parallel, "parent_process", object)
+        started.setattr(multiprocessing.process, "parent_process", object)
         assert set(over(lambda k: get_ident(), range(4))) == {get_ident()}
     together = Barrier(CORES, timeout=10.0)
     assert over(lambda k: together.wait() < CORES, range(CORES)) == CORES * [True]
