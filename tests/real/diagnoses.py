@@ -67,7 +67,7 @@ def write() -> None:
         sections = [one.result() for one in [pool_.submit(part) for part in parts]]
     minutes = (time.monotonic() - began) / 60.0
     text = "\n".join([HEAD, *sections, f"\nMade in {minutes:.0f} minutes.\n"])
-    (FOLDER / "diagnosis.md").write_text(text, encoding="utf-8")
+    put(text)
     stamp(FOLDER / "diagnosis.md")
 
 
@@ -80,7 +80,16 @@ def write_again(section: Callable[[], str]) -> None:
     if not found:
         sys.exit(f"{path}: there is no section {heading!r}. Fix: make the whole page")
     after = rest[min(place for end in ("\n## ", "\nMade in ") if (place := rest.find(end)) >= 0) :]
-    path.write_text(f"{before}{heading}\n\n{note}\n{body}\n{after}", encoding="utf-8")
+    put(f"{before}{heading}\n\n{note}\n{body}\n{after}")
+
+
+def put(text: str) -> None:
+    """Write the page, and remove figures of its earlier findings that it no longer shows."""
+    (FOLDER / "diagnosis.md").write_text(text, encoding="utf-8")
+    # Not before all sections are made: a run that ends early leaves the page as it was, with its figures.
+    for figure in FOLDER.glob("diagnosis-*.svg"):
+        if f"({figure.name})" not in text:
+            figure.unlink()
 
 
 HEAD = """# Diagnoses of recordings of real vessels
