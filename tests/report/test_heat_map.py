@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import shutil
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -44,17 +43,8 @@ def write(folder: Path, *windows_s: float, scripts: bool = True) -> Path:
 
 
 @pytest.fixture(scope="module")
-def trial(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write(tmp_path_factory.mktemp("sweep"), 0.5, 2.0)
-
-
-@pytest.fixture
-def opened(page: Page, trial: Path) -> Iterator[Page]:
-    """Give the page of the sweep, freshly opened, and see that its console stays clean."""
-    page.faults.clear()
-    page.open(trial)
-    yield page
-    assert page.faults == []
 
 
 def test_every_cell_of_a_sweep_tells_what_the_table_has() -> None:
@@ -148,8 +138,8 @@ def test_keys_go_from_cell_to_cell_within_the_map(opened: Page) -> None:
 
 @needs_chromium
 @pytest.mark.slow
-def test_a_finger_reads_a_cell_and_what_it_read_stays(opened: Page, trial: Path) -> None:
-    opened.open(trial, 400, 800)
+def test_a_finger_reads_a_cell_and_what_it_read_stays(opened: Page, written: Path) -> None:
+    opened.open(written, 400, 800)
     x, y = opened.middle(".heat-map .cell", 7)
     opened.send("Input.dispatchTouchEvent", type="touchStart", touchPoints=[{"x": x, "y": y}])
     opened.send("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
@@ -161,10 +151,10 @@ def test_a_finger_reads_a_cell_and_what_it_read_stays(opened: Page, trial: Path)
 @pytest.mark.slow
 @pytest.mark.parametrize("scripts", [True, False])
 def test_paper_has_the_static_map_and_a_page_alone_the_other_one(
-    page: Page, trial: Path, tmp_path: Path, *, scripts: bool
+    page: Page, written: Path, tmp_path: Path, *, scripts: bool
 ) -> None:
     page.faults.clear()
-    place = trial if scripts else write(tmp_path / "plain", 0.5, 2.0, scripts=False)
+    place = written if scripts else write(tmp_path / "plain", 0.5, 2.0, scripts=False)
     page.open(place)
     static = "document.querySelector('.heat svg').getBoundingClientRect().width > 0"
     shown = "document.querySelector('.heat-map').getBoundingClientRect().width > 0"

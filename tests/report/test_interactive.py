@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -50,7 +49,7 @@ def measured(one: Diagnosis, t: Floats) -> Diagnosis:
 
 
 @pytest.fixture(scope="module")
-def trial(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return report((measured(diagnosis("explained"), T),), tmp_path_factory.mktemp("out")).report
 
 
@@ -65,15 +64,6 @@ def all_views(page: Page) -> list[list[float]]:
 
 def named(name: str) -> str:
     return f'[aria-label="{name}"]'
-
-
-@pytest.fixture
-def opened(page: Page, trial: Path) -> Iterator[Page]:
-    """Give the page of the trial, freshly opened, and see that its console stays clean."""
-    page.faults.clear()
-    page.open(trial)
-    yield page
-    assert page.faults == []
 
 
 def test_buttons_zoom_and_move_all_strips_together(opened: Page) -> None:
@@ -225,8 +215,8 @@ def test_colours_follow_the_system_or_the_reader(opened: Page) -> None:
     assert opened.do(paper) == light
 
 
-def test_paper_and_a_page_alone_have_the_static_figures(page: Page, trial: Path, tmp_path: Path) -> None:
-    page.open(trial)
+def test_paper_and_a_page_alone_have_the_static_figures(page: Page, written: Path, tmp_path: Path) -> None:
+    page.open(written)
     visible = "[...document.querySelectorAll('figure')].filter((one) => one.offsetParent !== null).length"
     hidden = page.do("document.querySelectorAll('figure').length") - page.do(visible)
     assert hidden == 1
@@ -237,15 +227,15 @@ def test_paper_and_a_page_alone_have_the_static_figures(page: Page, trial: Path,
     page.send("Emulation.setEmulatedMedia", media="")
     alone = tmp_path / "alone" / "report.html"
     alone.parent.mkdir()
-    shutil.copy(trial, alone)
+    shutil.copy(written, alone)
     page.open(alone)
     assert page.do(f"{visible} === document.querySelectorAll('figure').length")
     assert page.do("document.querySelector('.timeline').offsetParent === null")
 
 
 @pytest.mark.parametrize("width", [420, 1400])
-def test_nothing_is_wider_than_the_window(page: Page, trial: Path, width: int) -> None:
-    page.open(trial, width)
+def test_nothing_is_wider_than_the_window(page: Page, written: Path, width: int) -> None:
+    page.open(written, width)
     assert page.do("document.documentElement.scrollWidth") <= width
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -43,21 +42,18 @@ def write(folder: Path, page: str, files: dict[str, str]) -> Path:
 
 
 @pytest.fixture(scope="module")
-def batch(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("batch")
     interactive = make_interactive(timelines(season()), out / "batch", out)
     return write(out / "batch", render(season(), interactive), interactive.files())
 
 
 @pytest.fixture
-def opened(page: Page, batch: Path) -> Iterator[Page]:
-    """Give the page of the batch, freshly opened, and see that its console stays clean."""
-    page.faults.clear()
-    page.open(batch)
-    page.do("document.querySelector('.timeline').scrollIntoView({block: 'center', behavior: 'instant'})")
-    page.settle()
-    yield page
-    assert page.faults == []
+def opened(opened: Page) -> Page:
+    """Give the page of the batch with its first figure in the middle of the window."""
+    opened.do("document.querySelector('.timeline').scrollIntoView({block: 'center', behavior: 'instant'})")
+    opened.settle()
+    return opened
 
 
 def point(page: Page, trace: int, row: int, strip: int = 0) -> tuple[float, float]:
@@ -154,24 +150,24 @@ def test_no_other_figure_is_laid_over_one_that_is_not_of_time(opened: Page) -> N
     assert opened.do("document.querySelectorAll('.beside').length") == 0
 
 
-def test_a_batch_on_paper_or_alone_has_its_static_figures(page: Page, batch: Path, tmp_path: Path) -> None:
-    page.open(batch)
+def test_a_batch_on_paper_or_alone_has_its_static_figures(page: Page, written: Path, tmp_path: Path) -> None:
+    page.open(written)
     drawn = "[...document.querySelectorAll('figure svg')].filter((one) => one.getBoundingClientRect().width > 0).length"
     assert page.do(drawn) == 0
     page.send("Emulation.setEmulatedMedia", media="print")
     assert page.do(drawn) == 2
     assert page.do("document.querySelector('.timeline').getBoundingClientRect().width") == 0
     page.send("Emulation.setEmulatedMedia", media="")
-    shutil.copy(batch, tmp_path)
-    page.open(tmp_path / batch.name)
+    shutil.copy(written, tmp_path)
+    page.open(tmp_path / written.name)
     assert page.do(drawn) == 2
     assert "Hollow: a hint" in page.do("document.querySelector('figcaption').innerText")
     page.faults.clear()
 
 
 @pytest.mark.parametrize("width", [400, 1400])
-def test_a_batch_is_no_wider_than_the_window(page: Page, batch: Path, width: int) -> None:
-    page.open(batch, width)
+def test_a_batch_is_no_wider_than_the_window(page: Page, written: Path, width: int) -> None:
+    page.open(written, width)
     assert page.do("document.documentElement.scrollWidth") <= width
 
 
