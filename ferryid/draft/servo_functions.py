@@ -247,7 +247,8 @@ def _limits(output: _Output, values: UsedValues, samples: Samples, *, thruster: 
     """Return pulses and sign as the parameters state them, and how these contradict the log and each other."""
     servo = f"SERVO{output.number}"
     names = tuple(f"{servo}_{end}" for end in ("MIN", "TRIM", "MAX"))
-    stated = [values.get(name) for name in names]
+    # As the profile shows them: ends that are alike there leave no travel.
+    stated = [None if (value := values.get(name)) is None else float(f"{value:g}") for name in names]
     reversed_ = bool(values.whole(f"{servo}_REVERSED") or 0)
     sign, sign_by = (-1.0 if reversed_ else 1.0), f"{servo}_REVERSED = {int(reversed_)}"
     least, neutral, most = stated
@@ -276,8 +277,14 @@ def _limits(output: _Output, values: UsedValues, samples: Samples, *, thruster: 
         )
     if neutral == most:
         # No pulse goes beyond; a profile needs a longer one for the other direction all the same.
-        most = 2.0 * neutral - least
+        mirrored = 2.0 * neutral - least
+        most = min(mirrored, PULSE_LIMITS_US[1])
         evidence.append(f"{most:g} us is never sent, as no pulse goes beyond neutral")
+        if most < mirrored:
+            doubts.append(
+                f"{names[1]} = {names[2]} = {neutral:g} and {names[0]} = {least:g}: a pulse as far beyond neutral, "
+                f"{mirrored:g} us, is none, and {most:g} us stands in its place; such pulses are unusual"
+            )
     dead = _dead_band(values, least, neutral, most) if thruster else 0.0
     if dead:
         evidence.append(
@@ -297,6 +304,8 @@ def _fault(names: tuple[str, ...], least: float, neutral: float, most: float) ->
         return f"{names[0]} = {least:g} is not below {names[2]} = {most:g}"
     if not least <= neutral <= most:
         return f"{names[1]} = {neutral:g} lies outside of {names[0]} = {least:g} to {names[2]} = {most:g}"
+    if neutral == most == PULSE_LIMITS_US[1]:
+        return f"{names[1]} = {names[2]} = {most:g} leave no pulse beyond neutral"
     if least < PULSE_LIMITS_US[0] or most > PULSE_LIMITS_US[1]:
         return f"{names[0]} = {least:g} to {names[2]} = {most:g} are no pulses"
     return ""

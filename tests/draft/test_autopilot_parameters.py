@@ -161,6 +161,19 @@ def test_motors_of_a_vessel_that_pushes_aside(trial: Columns, tmp_path: Path) ->
         ({"SERVO3_MIN": 1900.0, "SERVO3_MAX": 1100.0}, "SERVO3_MIN = 1900 is not below SERVO3_MAX = 1100: usual pulses"),
         ({"SERVO1_TRIM": 1900.0}, "SERVO1_TRIM = 1900 lies outside of SERVO1_MIN = 1200 to SERVO1_MAX = 1800"),
         ({"SERVO3_MIN": 0.0}, "SERVO3_MIN = 0 to SERVO3_MAX = 1900 are no pulses"),
+        (
+            {"SERVO3_MIN": 100.0, "SERVO3_TRIM": 2600.0, "SERVO3_MAX": 2600.0},
+            "SERVO3_TRIM = SERVO3_MAX = 2600 and SERVO3_MIN = 100: a pulse as far beyond neutral, 5100 us, is none",
+        ),
+        (
+            {"SERVO1_MIN": 100.0, "SERVO1_TRIM": 2600.0, "SERVO1_MAX": 2600.0},
+            "SERVO1_TRIM = SERVO1_MAX = 2600 and SERVO1_MIN = 100: a pulse as far beyond neutral, 5100 us, is none",
+        ),
+        (
+            {"SERVO3_TRIM": 5000.0, "SERVO3_MAX": 5000.0},
+            "SERVO3_TRIM = SERVO3_MAX = 5000 leave no pulse beyond neutral: usual pulses",
+        ),
+        ({"SERVO3_MIN": 1899.9999}, "SERVO3_MIN = 1900 is not below SERVO3_MAX = 1900: usual pulses"),
         ({"SERVO3_MAX": 1700.0}, "us were sent, beyond SERVO3_MIN and SERVO3_MAX"),
         ({"SERVO1_REVERSED": 1.0}, "SERVO1_REVERSED = 1 states the other sign: the motion decides"),
         ({"SERVO3_REVERSED": 1.0}, "SERVO3_REVERSED = 1, but the vessel goes slower ahead when it pushes ahead"),
