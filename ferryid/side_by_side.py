@@ -5,11 +5,16 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Iterable
+from functools import wraps
 from threading import Event, Thread, local
-from typing import Any, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
+P = ParamSpec("P")
 T = TypeVar("T")
 R = TypeVar("R")
+
+THREADS_OF_BLAS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
+"""Environment variables by which a user says how many threads matrix products take."""
 
 _thread = local()
 _alone = False
@@ -74,6 +79,26 @@ def over(function: Callable[[T], R], items: Iterable[T], *, most: int | None = N
     if failed:
         raise failed[min(failed)]
     return [made[k] for k in range(len(every))]
+
+
+def blas_on_one_thread(call: Callable[P, R]) -> Callable[P, R]:
+    """Keep the matrix products within a call to one thread each, but where the user chose by one of `THREADS_OF_BLAS`.
+
+    They are too small for more: threads of BLAS that wait for work take the cores from those of `over`.
+    """
+
+    @wraps(call)
+    def limited(*args: P.args, **named: P.kwargs) -> R:
+        if any(os.environ.get(name) for name in THREADS_OF_BLAS):
+            return call(*args, **named)
+        # NumPy and SciPy bring a library each, and only those that are loaded can be limited.
+        import scipy.linalg  # noqa: F401
+        from threadpoolctl import threadpool_limits
+
+        with threadpool_limits(1, user_api="blas"):
+            return call(*args, **named)
+
+    return limited
 
 
 def keep_to_one_thread() -> None:

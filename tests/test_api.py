@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import os
 import subprocess
 import sys
 from functools import partial
@@ -16,6 +17,7 @@ from ferryid.errors import FerryIdError
 from ferryid.identify import FitSettings
 from ferryid.report import outcome as outcome_module
 from ferryid.report.outcome import Outcome
+from ferryid.side_by_side import THREADS_OF_BLAS
 from ferryid.vessel import load_profile
 
 pytestmark = pytest.mark.draws
@@ -118,3 +120,38 @@ def test_the_types_that_signatures_name_are_where_the_calls_are() -> None:
         assert name in {parameter.annotation for parameter in signature.parameters.values()}
         assert hasattr(api, name)
     assert signature.parameters["out"].default is api.OUT
+
+
+@pytest.mark.parametrize(("chosen", "threads"), [({}, 1), ({"OPENBLAS_NUM_THREADS": "2"}, 2)])
+def test_matrix_products_take_one_thread_within_a_call_but_where_the_user_chose(
+    chosen: dict[str, str], threads: int
+) -> None:
+    code = (
+        "import numpy, scipy.linalg\n"
+        "from threadpoolctl import threadpool_info, threadpool_limits\n"
+        "from ferryid.side_by_side import blas_on_one_thread\n"
+        "threads = lambda: {one['num_threads'] for one in threadpool_info() if one['user_api'] == 'blas'}\n"
+        "threadpool_limits(2, user_api='blas')\n"
+        "print(blas_on_one_thread(threads)(), threads())\n"
+    )
+    environment = {name: value for name, value in os.environ.items() if name not in THREADS_OF_BLAS}
+    found = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env={**environment, **chosen}
+    )
+    assert found.stdout.strip() == f"{{{threads}}} {{2}}"
+
+
+def test_every_call_that_estimates_keeps_matrix_products_to_one_thread() -> None:
+    estimate = (
+        "batch",
+        "compare",
+        "compare_groups",
+        "diagnose",
+        "evaluate",
+        "fit",
+        "plan",
+        "prove",
+        "reproduce",
+        "sweep",
+    )
+    assert {name for name in api.__all__ if hasattr(getattr(api, name), "__wrapped__")} == set(estimate)

@@ -6,11 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ferryid.api.arguments import OUT, Logs, Progress, Ranges, outcome_of, paths_of, quiet
+from ferryid.side_by_side import blas_on_one_thread
 
 if TYPE_CHECKING:
     from ferryid.report.outcome import Outcome
 
 
+@blas_on_one_thread
 def batch(
     logs: Logs,
     out: str | Path = OUT,

@@ -21,6 +21,7 @@ from ferryid.api.arguments import (
     run_context,
     vessel_beside_model,
 )
+from ferryid.side_by_side import blas_on_one_thread
 
 if TYPE_CHECKING:
     from ferryid.diagnose import DiagnosisSettings
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from ferryid.vessel.profile import Profile
 
 
+@blas_on_one_thread
 def diagnose(
     logs: Logs,
     vessel: str | Path | Profile | None = None,
@@ -82,6 +84,7 @@ def diagnose(
     return outcome
 
 
+@blas_on_one_thread
 def compare_groups(
     logs: Logs,
     versus: Logs,
@@ -141,6 +144,7 @@ def _examined(
     return profile, replace(settings or DiagnosisSettings(), model=examined)
 
 
+@blas_on_one_thread
 def plan(
     vessel: str | Path | Profile | None = None,
     after: Logs = (),

@@ -23,6 +23,7 @@ from ferryid.api.arguments import (
     vessel_beside_model,
     vessel_of_archive,
 )
+from ferryid.side_by_side import blas_on_one_thread
 
 if TYPE_CHECKING:
     from ferryid.identify import FitSettings
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from ferryid.vessel.profile import Profile
 
 
+@blas_on_one_thread
 def fit(
     logs: Logs,
     vessel: str | Path | Profile | None = None,
@@ -95,6 +97,7 @@ def fit(
     return shown_where_refused(fitted, "fitted", paths, profile, run, command) if report else fitted()
 
 
+@blas_on_one_thread
 def evaluate(
     model: str | Path | Model,
     logs: Logs,
@@ -121,6 +124,7 @@ def evaluate(
     return outcome_of(result, render_evaluation(result))
 
 
+@blas_on_one_thread
 def compare(
     models: Sequence[str],
     on: Logs = (),
@@ -168,6 +172,7 @@ def compare(
     return outcome
 
 
+@blas_on_one_thread
 def sweep(
     what: Literal["components", "window", "both", "basis"] | str,
     logs: Logs,

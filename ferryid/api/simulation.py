@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ferryid.api.arguments import OUT, Progress, announced, model_of, outcome_of, quiet
+from ferryid.side_by_side import blas_on_one_thread
 
 if TYPE_CHECKING:
     from ferryid.models import Model
@@ -50,6 +51,7 @@ def simulate(
     return outcome_of(result, render_simulation(result))
 
 
+@blas_on_one_thread
 def reproduce(
     what: str,
     out: str | Path = OUT,
@@ -67,6 +69,7 @@ def reproduce(
     return outcome_of(result, render_reproduction(result))
 
 
+@blas_on_one_thread
 def prove(
     out: str | Path = OUT,
     *,
