@@ -43,6 +43,8 @@ SEED, RUNS = 2020, 0.2
 FIT = "fit"
 FEWEST = 10
 """Logs from which on it is said whether an aim is reached."""
+OF_CASE = ("cell", "concealed")
+"""What a line has beside the scores: the kind of the case, and its effects."""
 NEAR = 1.05
 """Error over the best one's up to which a model counts as best."""
 
@@ -65,7 +67,7 @@ def try_case(case: Case, folder: Path) -> dict[str, Any]:
     learners = {FIT: learn_fit, **RIVALS, "output error": learn_output_error}
     profile = load_profile(first.profile)
     result = transfer_test(str(first.log), str(second.log), profile, out, diagnosed=diagnosed, rivals=learners)
-    return {"cell": case.cell, **result.to_json()}
+    return {"cell": case.cell, "concealed": [truth.effect for truth in case.truths], **result.to_json()}
 
 
 def learn_fit(log: str, profile: Profile, out: Path) -> LearnedModel:
@@ -133,6 +135,36 @@ def section(found: Sequence[Mapping[str, Any]]) -> list[str]:
             f"| {title} | {np.median(force):.2f} | {np.nanmedian(position / base):.2f} | {100 * best[0]:.0f} % | "
             f"{100 * best[1]:.0f} % | {int(np.sum(~np.isfinite(position)))} |"
         )
+    return lines + _log_by_log(found, results)
+
+
+def _log_by_log(found: Sequence[Mapping[str, Any]], results: Sequence[TransferResult]) -> list[str]:
+    """Return each log: what was concealed, what the diagnosed model has of it, and how this stands beside the best other."""
+    lines = [
+        "",
+        "Log by log: *in the model* is what the diagnosis was sure of. Errors are those of the diagnosed model over those of "
+        "the best other.",
+        "",
+        "| case | concealed | in the model | force | best other | position | best other |",
+        "|---|---|---|--:|---|--:|---|",
+    ]
+    lost, missed = 0, 0
+    for plain, one in zip(found, results, strict=True):
+        ours, others = one.methods[DIAGNOSED], {name: s for name, s in one.methods.items() if name != DIAGNOSED}
+        known = [effect.effect for effect in ours.effects or ()]
+        cells = [str(plain["cell"]), ", ".join(plain["concealed"]) or "nothing", ", ".join(known) or "nothing"]
+        for measure in (force_error, position_error):
+            name = min(others, key=lambda each, measure=measure: measure(others[each]))  # type: ignore[misc]
+            least = measure(others[name])
+            cells += [f"{measure(ours) / least:.2f}" if isfinite(least) else "0", name if isfinite(least) else "none"]
+        lines.append(f"| {' | '.join(cells)} |")
+        if force_error(ours) > NEAR * min(map(force_error, others.values())):
+            lost, missed = lost + 1, missed + (not set(plain["concealed"]) <= set(known))
+    lines += [
+        "",
+        f"On {counted(lost, 'log')} another model has the least force error; in {missed} of them the diagnosis was not sure of "
+        "all that was concealed, so that its model leaves it out. Sparse and stepwise regression take what lowers the error.",
+    ]
     return lines
 
 
@@ -170,4 +202,4 @@ def _best(results: Sequence[TransferResult], name: str, measure: Any) -> list[bo
 
 
 def _result(plain: Mapping[str, Any]) -> TransferResult:
-    return TransferResult.from_json({name: value for name, value in plain.items() if name != "cell"})
+    return TransferResult.from_json({name: value for name, value in plain.items() if name not in OF_CASE})

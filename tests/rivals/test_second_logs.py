@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from ferryid.validation.records import DIAGNOSED, TransferResult, TransferScore
+from ferryid.validation.records import DIAGNOSED, StoredEffectNote, TransferResult, TransferScore
 from tests.rivals import second_logs
 from tests.rivals.second_logs import FIT, cases, force_error, position_error, section, targets
 
@@ -16,13 +17,15 @@ def score(force: float | None, position_m: float | None, diverged: int = 0) -> T
     return TransferScore(dict.fromkeys(("surge", "sway", "yaw"), force), position_m, 0.1, 60, diverged)
 
 
-def result(**methods: TransferScore) -> dict[str, Any]:
+def result(*known: str, **methods: TransferScore) -> dict[str, Any]:
+    ours = replace(methods["ours"], effects=tuple(StoredEffectNote(one, None, "") for one in known))
+    methods = {**methods, "ours": ours}
     named = {DIAGNOSED: methods["ours"], FIT: methods["fit"], "stepwise": methods["stepwise"]}
-    return {"cell": "wind", **TransferResult(score(100.0, 4.0), named).to_json()}
+    return {"cell": "wind", "concealed": ["wind"], **TransferResult(score(100.0, 4.0), named).to_json()}
 
 
 FOUND = [
-    result(ours=score(0.5, 1.0), fit=score(0.6, 0.5), stepwise=score(0.9, 2.0)),
+    result("wind", ours=score(0.5, 1.0), fit=score(0.6, 0.5), stepwise=score(0.9, 2.0)),
     result(ours=score(0.52, 3.0), fit=score(0.5, 3.0), stepwise=score(0.7, 0.1, diverged=2)),
     result(ours=score(0.9, 3.0), fit=score(0.8, 2.9), stepwise=score(0.3, 2.0)),
 ]
@@ -50,6 +53,16 @@ def test_the_table_has_every_model() -> None:
     text = "\n".join(section(FOUND))
     assert "| diagnosed and learnt (`diagnose`) | 0.52 | 0.75 | 67 % | 33 % | 0 |" in text
     assert "| stepwise | 0.70 | 0.50 | 33 % | 33 % | 1 |" in text
+
+
+def test_each_log_says_what_was_concealed_and_how_the_diagnosed_model_stands() -> None:
+    lines = section(FOUND)
+    assert "| wind | wind | wind | 0.83 | fit | 2.00 | fit |" in lines
+    assert "| wind | wind | nothing | 1.04 | fit | 1.00 | fit |" in lines
+    assert "| wind | wind | nothing | 3.00 | stepwise | 1.50 | stepwise |" in lines
+    assert lines[-1].startswith(
+        "On 1 log another model has the least force error; in 1 of them the diagnosis was not sure"
+    )
 
 
 def test_the_draw_is_the_same_every_time() -> None:
