@@ -4,3 +4,16 @@ Importing this package imports nothing heavy, writes nothing and configures noth
 """
 
 __version__ = "0.1.0"
+
+TYPE_CHECKING = False
+"""As of `typing`, which takes longer to import than this package: a type checker reports what is not here."""
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> object:
+        """Say where the calls of the Python API are: subpackages have the names of some, so that they cannot be here."""
+        from importlib import import_module
+
+        calls = import_module("ferryid.api").__all__ if name != "api" else ()
+        where = f": it is ferryid.api.{name} (from ferryid import api)" if name in calls else ""
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}{where}")

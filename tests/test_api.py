@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+import ferryid
 from ferryid import api
 from ferryid.errors import FerryIdError
 from ferryid.identify import FitSettings
@@ -47,6 +48,16 @@ def test_every_call_is_typed_and_documented() -> None:
 def test_importing_it_imports_nothing_heavy() -> None:
     code = "import sys, ferryid.api; print([name for name in ('numpy', 'pandas', 'typer') if name in sys.modules])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
+
+
+def test_who_looks_for_a_call_in_the_package_is_told_where_it_is() -> None:
+    with pytest.raises(
+        AttributeError, match=r"no attribute 'fit': it is ferryid\.api\.fit \(from ferryid import api\)"
+    ):
+        ferryid.fit  # noqa: B018
+    with pytest.raises(AttributeError, match=r"no attribute 'fitt'$"):
+        ferryid.fitt  # noqa: B018
+    assert not hasattr(ferryid, "sweep")
 
 
 @pytest.mark.slow
