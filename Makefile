@@ -10,8 +10,10 @@ DEMO ?= ferryid-out
 .PHONY: quick test docs evidence size demo picture bench attack faults real campaign rivals plans thesis proof proof-sea proof-real \
   wavy fixtures wheel-check lint clean uplot
 
-# On two cores: by files, so that the fixtures of a file are made once, in the order of tests/conftest.py.
-SPREAD = -n 2 --dist loadfile --no-loadscope-reorder
+# By files, so that the fixtures of a file are made once, in the order of tests/conftest.py. WORKERS=4 for as many cores, each
+# takes up to 1.2 GB.
+WORKERS ?= 2
+SPREAD = -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
 # What most changes break, within a minute.
 quick: $(VENV)/installed
