@@ -120,11 +120,13 @@ def section(found: Sequence[Mapping[str, Any]]) -> list[str]:
         "second. *Force*: squared force error over the base model's, mean of the axes, with the noise of velocities smoothed "
         f"over {WINDOW_S:g} s in it. *Position*: of free runs after 60 s over the base model's. Both are medians; a model that "
         "there is not, or of which a run diverges, counts as infinite. *Best*: logs on which it has the least error, or at "
-        f"most {NEAR:g} times that. Output error and `fit` have the same terms; sparse regressions choose from physics, too.",
+        f"most {NEAR:g} times that. *Ours over it*: position of the diagnosed model over that of the other, median. Output "
+        "error and `fit` have the same terms; sparse regressions choose from physics, too.",
         "",
-        "| model | force | position | best, force | best, position | no model or diverged |",
-        "|---|---|---|---|---|---|",
+        "| model | force | position | ours over it | best, force | best, position | no model or diverged |",
+        "|---|---|---|---|---|---|---|",
     ]
+    ours = np.array([position_error(one.methods[DIAGNOSED]) for one in results])
     for name in results[0].methods:
         force = np.array([force_error(one.methods[name]) for one in results])
         position = np.array([position_error(one.methods[name]) for one in results])
@@ -132,8 +134,8 @@ def section(found: Sequence[Mapping[str, Any]]) -> list[str]:
         best = [np.mean(_best(results, name, measure)) for measure in (force_error, position_error)]
         title = "diagnosed and learnt (`diagnose`)" if name == DIAGNOSED else name
         lines.append(
-            f"| {title} | {np.median(force):.2f} | {np.nanmedian(position / base):.2f} | {100 * best[0]:.0f} % | "
-            f"{100 * best[1]:.0f} % | {int(np.sum(~np.isfinite(position)))} |"
+            f"| {title} | {np.median(force):.2f} | {np.nanmedian(position / base):.2f} | {np.median(ours / position):.2f} | "
+            f"{100 * best[0]:.0f} % | {100 * best[1]:.0f} % | {int(np.sum(~np.isfinite(position)))} |"
         )
     return lines + _log_by_log(found, results)
 

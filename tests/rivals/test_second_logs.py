@@ -51,8 +51,8 @@ def test_aims_compare_with_rivals_and_the_best_with_all() -> None:
 
 def test_the_table_has_every_model() -> None:
     text = "\n".join(section(FOUND))
-    assert "| diagnosed and learnt (`diagnose`) | 0.52 | 0.75 | 67 % | 33 % | 0 |" in text
-    assert "| stepwise | 0.70 | 0.50 | 33 % | 33 % | 1 |" in text
+    assert "| diagnosed and learnt (`diagnose`) | 0.52 | 0.75 | 1.00 | 67 % | 33 % | 0 |" in text
+    assert "| stepwise | 0.70 | 0.50 | 0.50 | 33 % | 33 % | 1 |" in text
 
 
 def test_each_log_says_what_was_concealed_and_how_the_diagnosed_model_stands() -> None:
