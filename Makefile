@@ -75,8 +75,8 @@ campaign: $(VENV)/installed
 # ferryid's estimators beside output error, sparse and stepwise regression: writes reports/rivals.md. TRIALS=N simulates that many
 # trials of each kind, SECOND=N takes so many cases of the proof; the recordings are left out where they are absent. A run that was
 # ended goes on from build/rivals/lines.jsonl.
-TRIALS ?= 5
-SECOND ?= 10
+TRIALS ?= 13
+SECOND ?= 30
 rivals: $(VENV)/installed
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.rivals --trials $(TRIALS) --second $(SECOND)
 

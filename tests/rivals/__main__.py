@@ -39,8 +39,8 @@ WORK = ROOT / "build" / "rivals"
 def main() -> None:
     """Do what is not done yet, and write the page."""
     parser = argparse.ArgumentParser(prog="python -m tests.rivals")
-    parser.add_argument("--trials", type=int, default=5, help="simulated trials of each kind")
-    parser.add_argument("--second", type=int, default=10, help="cases of the proof with a second log")
+    parser.add_argument("--trials", type=int, default=13, help="simulated trials of each kind")
+    parser.add_argument("--second", type=int, default=30, help="cases of the proof with a second log")
     parser.add_argument("--processes", type=int, default=2, help="processes side by side")
     parser.add_argument("--page", action="store_true", help="write the page from what is known; run nothing")
     options = parser.parse_args()
