@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -36,10 +37,32 @@ _ARRAYS = (
 """Topics of PX4 that are arrays without names of their elements: what they are. Its quaternions begin with the scalar."""
 
 
+_VELOCITIES = {
+    "vehicle_local_position": "NED",
+    "vehicle_local_position_groundtruth": "NED",
+    "vehicle_global_position": "NED",
+    "vehicle_gps_position": "NED",
+    "sensor_gps": "NED",
+    "control_state": "FRD",
+}
+"""Topics of PX4 whose definitions state the frame of their velocity; that of an odometry is in a field of its own."""
+
+
 def with_frames(groups: Sequence[FieldGroup], topics: Sequence[Topic]) -> list[FieldGroup]:
-    """Return groups with the frame that the formats of the autopilots state: both keep poses in NED."""
-    stated = {topic.name for topic in topics if topic.encoding in ("ulog", "dataflash")}
-    return [replace(one, frame="NED") if one.topic in stated else one for one in groups]
+    """Return groups with the frame that the formats of the autopilots state: both keep poses in NED, velocities as named."""
+    encodings = {topic.name: topic.encoding for topic in topics}
+    return [replace(one, frame=_stated_frame(one, encodings.get(one.topic, ""))) for one in groups]
+
+
+def _stated_frame(group: FieldGroup, encoding: str) -> str:
+    """Return the frame of a group as its format states it, or an empty string."""
+    if encoding not in ("ulog", "dataflash"):
+        return group.frame
+    if group.kind != "velocity":
+        return "NED"
+    if encoding == "ulog":
+        return _VELOCITIES.get(re.sub(r"\[[0-9]+\]$", "", group.topic.strip("/")), "")
+    return "NED" if group.fields == ("VN", "VE") else ""
 
 
 def autopilot_groups(topics: Sequence[Topic]) -> list[FieldGroup]:
@@ -121,11 +144,7 @@ def moving(fields: Sequence[ActuatorField], samples: Samples) -> list[ActuatorFi
     One motor and one servo are a propeller and a rudder, as many servos as motors azimuths; of other numbers only a person
     knows what a servo turns.
     """
-    kept = []
-    for one in fields:
-        values = samples.raw(one.stream, one.path) if (one.stream, one.path) in samples.columns else np.empty(0)
-        if np.unique(values[np.isfinite(values)]).size > 1:
-            kept.append(one)
+    kept = changing(fields, samples)
     motors = [one for one in kept if not one.actuator.startswith("servo")]
     servos = [one for one in kept if one.actuator.startswith("servo")]
     if not servos or len(servos) != len(motors):
@@ -134,3 +153,13 @@ def moving(fields: Sequence[ActuatorField], samples: Samples) -> list[ActuatorFi
     return motors + [
         replace(servo, actuator=motor.actuator, role=role) for motor, servo in zip(motors, servos, strict=True)
     ]
+
+
+def changing(fields: Sequence[ActuatorField], samples: Samples) -> list[ActuatorField]:
+    """Return the fields that take more than one value."""
+    kept = []
+    for one in fields:
+        values = samples.raw(one.stream, one.path) if (one.stream, one.path) in samples.columns else np.empty(0)
+        if np.unique(values[np.isfinite(values)]).size > 1:
+            kept.append(one)
+    return kept

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ferryid.draft.actuator_fields import actuator_fields, parted, shared_topics
 from ferryid.draft.actuators import UNKNOWN_ORDER, DraftedActuator, drafted_actuators
-from ferryid.draft.autopilots import Orders, autopilot_fields, autopilot_groups, orders, with_frames
+from ferryid.draft.autopilots import Orders, autopilot_fields, autopilot_groups, changing, orders, with_frames
 from ferryid.draft.fields import navigation_groups
 from ferryid.draft.kinematics import navigation_signals
 from ferryid.draft.mapped import MappedSignal
@@ -107,6 +107,7 @@ def draft_profile(log: str | Path, like: Profile | None = None, ranges: TimeRang
             f"{log}: {_nothing(topics)}. Fix: write the signal map by hand, see ferryid vessel show --toml"
         )
     samples = read_samples(reader, wanted, str(log), ranges)
+    looked_for = fields
     driven = orders(fields, samples, parameters_of(reader)) if autopilot else Orders(tuple(fields))
     fields = list(driven.fields)
     for bus in shared:
@@ -120,10 +121,16 @@ def draft_profile(log: str | Path, like: Profile | None = None, ranges: TimeRang
         )
     actuators = drafted_actuators(fields, samples, motion, driven.placements)
     if not actuators:
+        still = [] if changing(looked_for, samples) else [f"{one.topic}: {one.path}" for one in looked_for]
+        what = (
+            f"nothing that looks like an actuator ever changes, found {_listed(still)}"
+            if still
+            else "no field looks like an actuator's speed, angle, force or order, found the topics "
+            f"{_listed([one.name for one in topics])}"
+        )
         raise FerryIdError(
-            f"{log}: no field looks like an actuator's speed, angle, force or order, found the topics "
-            f"{_listed([one.name for one in topics])}{''.join(f'; {one}' for one in driven.remarks)}. Fix: record the orders, "
-            "or write the signal map by hand"
+            f"{log}: {what}{''.join(f'; {one}' for one in driven.remarks)}. Fix: record "
+            f"{'while the vessel is driven' if still else 'the orders'}, or write the signal map by hand"
         )
     wind = wind_signal(winds, samples, motion)
     every = [*signals, *([] if wind is None else [wind]), *_tau_d(topics)]

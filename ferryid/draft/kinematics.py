@@ -201,7 +201,8 @@ def _poses(position: FieldGroup | None, heading: FieldGroup, samples: Samples) -
         _Pose(
             position, heading, frame, metre, other, unit, north, east, 0.5 * np.pi - angle if other == "ENU" else angle
         )
-        for (frame, north, east), other in product(sides, _WORLD)
+        for (frame, north, east), other in product(sides, [heading.frame] if heading.frame in _WORLD else _WORLD)
+        if frame not in _WORLD or position is None or position.frame in ("", frame)
     ]
 
 
@@ -223,16 +224,22 @@ def _agreement(pose: _Pose, velocity: FieldGroup | None, samples: Samples) -> _A
         return _Agreement(_along(pose), "", 1.0, 0.0, None, pose)
     first, second = (_smoothed(samples, velocity, place) for place in (0, 1))
     ahead, aside = to_body(pose.north, pose.east, pose.psi)
-    named = _named_velocity_frame(velocity) or "FRD"
-    best = _Agreement(-1.0, named, 1.0, 0.0, velocity, pose)
+    named = velocity.frame or _named_velocity_frame(velocity)
+    if pose.position is None:
+        return _Agreement(0.0, named or "FRD", 1.0, 0.0, velocity, pose)
+    seen = {}
     for frame in (*_BODY, *_WORLD):
         x, y = (ahead, aside) if frame in _BODY else (pose.north, pose.east)
         x, y = {"FLU": (x, -y), "ENU": (y, x)}.get(frame, (x, y))
         share, gain, sway = _explained(first, second, x, y)
-        if share > best.share + (DRAFT.even if frame in _WORLD or frame == "FLU" else 0.0):
-            best = _Agreement(share, frame, gain, sway, velocity, pose)
-    if pose.position is None:
-        return _Agreement(0.0, named, 1.0, 0.0, velocity, pose)
+        seen[frame] = _Agreement(share, frame, gain, sway, velocity, pose)
+    best = seen[named or "FRD"]
+    if velocity.frame:
+        return best
+    for one in seen.values():
+        # Where nothing moves, small differences say nothing against a name.
+        if one.share > best.share + DRAFT.even and (not named or one.share >= DRAFT.agrees):
+            best = one
     return best
 
 
@@ -368,7 +375,7 @@ def _others(groups: Sequence[FieldGroup], chosen: _Agreement, samples: Samples) 
         apart = [one for one in others if not _alike(mine, [_smoothed(samples, one, place) for place in (0, 1)])]
         if apart:
             names = ", ".join(one.label for one in (chosen.velocity, *apart))
-            what = "no position" if chosen.pose.position is None else "the position agrees with none, so that it"
+            what = "no position" if chosen.pose.position is None else "no position that agrees with one of them"
             raise FerryIdError(
                 f"{1 + len(apart)} velocities disagree, and {what} decides which is right: {names}. Fix: choose a part of the "
                 "log with --from and --to in which the vessel moves, or write the signal map by hand, see ferryid vessel show"
@@ -395,14 +402,16 @@ def _velocity(velocity: FieldGroup, chosen: _Agreement, others: Sequence[str]) -
     if others:
         evidence += f"; of other velocities: {', '.join(others)}"
     if chosen.pose.position is not None and chosen.share < DRAFT.agrees:
-        doubts.append(
-            "pose and velocity do not agree in any frame: another topic may be right, or the log is too short"
-        )
+        frames = f"in {velocity.frame}, which its format states" if velocity.frame else "in any frame"
+        doubts.append(f"pose and velocity do not agree {frames}: another topic may be right, or the log is too short")
     if chosen.pose.position is None:
         evidence = "no position to compare it with"
         named = _named_velocity_frame(velocity)
-        evidence += f"; {named} by the names of its components" if named else ""
-        doubts.append("its unit is assumed" if named else "unit and frame are assumed")
+        if velocity.frame:
+            evidence += f"; {velocity.frame} as its format states"
+        elif named:
+            evidence += f"; {named} by the names of its components"
+        doubts.append("its unit is assumed" if velocity.frame or named else "unit and frame are assumed")
     elif abs(log(max(left, 1e-3))) > DRAFT.gain:
         doubts.append(f"it is {left:.2f} times the position's slope, which no unit explains")
     if chosen.frame in _BODY and abs(chosen.sway) < DRAFT.seen:

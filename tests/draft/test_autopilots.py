@@ -223,3 +223,52 @@ def test_a_log_of_an_autopilot_without_orders_is_one_line(trial: Columns, tmp_pa
         FerryIdError, match=r"no field looks like an actuator.*vehicle_local_position.*Fix: record the orders"
     ):
         draft_profile(tmp_path / "boat.ulg")
+
+
+def drifting(trial: Columns) -> Columns:
+    """A trial of a vessel that lies still: its position wanders by centimetres, its velocity is noise that does not agree."""
+    rng = np.random.default_rng(4)
+    still = {name: 0.0 * values for name, values in trial.items()} | {"t": trial["t"]}
+    wandering = {name: 0.01 * np.cumsum(rng.normal(size=len(trial["t"]))) for name in ("N", "E")}
+    noise = {name: 0.02 * rng.normal(size=len(trial["t"])) for name in ("vn", "ve")}
+    turning = {"psi": 2.0 + 0.002 * np.cumsum(rng.normal(size=len(trial["t"])))}
+    return still | wandering | noise | turning | {name: trial[name] for name in ("rudder", "n")}
+
+
+@pytest.mark.parametrize("name", ["boat.ulg", "boat.bin"])
+def test_frames_that_the_format_states_hold_where_nothing_moves(trial: Columns, tmp_path: Path, name: str) -> None:
+    still = drifting(trial) | {"lat": trial["lat"], "lon": trial["lon"]}
+    (tmp_path / name).write_bytes(px4(still) if name.endswith("ulg") else ardupilot(still))
+    draft = draft_profile(tmp_path / name)
+    assert {one: shown(draft)[one][3] for one in ("heading", "velocity")} == {"heading": "NED", "velocity": "NED"}
+    doubts = next(one.doubts for one in draft.signals if one.quantity == "velocity")
+    assert any("do not agree in NED, which its format states" in doubt for doubt in doubts)
+
+
+@pytest.mark.parametrize("name", ["boat.ulg", "boat.bin"])
+def test_no_motion_overrules_the_frame_that_the_format_states(trial: Columns, tmp_path: Path, name: str) -> None:
+    # What stands there is along the hull, which the definition of these fields rules out.
+    along = trial | {"vn": trial["u"], "ve": trial["v"]}
+    (tmp_path / name).write_bytes(px4(along) if name.endswith("ulg") else ardupilot(along))
+    draft = draft_profile(tmp_path / name)
+    assert shown(draft)["velocity"][3] == "NED"
+    assert any("do not agree in NED" in doubt for one in draft.signals for doubt in one.doubts)
+
+
+def test_a_refusal_of_velocities_that_disagree_says_that_no_position_decides(trial: Columns, tmp_path: Path) -> None:
+    still = drifting(trial)
+    rng = np.random.default_rng(5)
+    lines = np.column_stack([trial["t"], still["N"], still["E"], still["psi"], still["vn"], still["ve"],
+                             *rng.normal(size=(2, len(trial["t"]))), trial["n"]])  # fmt: skip
+    path = tmp_path / "trial.csv"
+    np.savetxt(path, lines, delimiter=",", header="t,N,E,psi,u,v,dvl_vx,dvl_vy,rpm", comments="")
+    with pytest.raises(FerryIdError, match="no position that agrees with one of them decides which is right"):
+        draft_profile(path)
+
+
+def test_orders_that_never_change_are_named_in_the_refusal(trial: Columns, tmp_path: Path) -> None:
+    (tmp_path / "boat.ulg").write_bytes(px4(trial, motors={"1": 0.0 * trial["n"]}, servos={"1": 0.0 * trial["n"]}))
+    with pytest.raises(
+        FerryIdError, match=r"ever changes, found /actuator_motors: control\[0\].*while the vessel is driven"
+    ):
+        draft_profile(tmp_path / "boat.ulg")
