@@ -95,15 +95,9 @@ def guess_time(sample: Mapping[str, Sequence[str]]) -> TimePlan | None:
     sample
         Column name to its first values as text.
     """
-    for name, values in sample.items():
-        bare, word = _without_unit(name)
-        if not _TIME_NAME.match(bare):
-            continue
-        if _are_datetimes(values):
-            return _plan(sample, name, "datetime", "date and time")
-        numbers = _rising(values, strict=False)
-        if numbers is not None:
-            return _plan(sample, name, *_unit_of(word, numbers))
+    for name in sample:
+        if _TIME_NAME.match(_without_unit(name)[0]) and (plan := _time_of(sample, name)) is not None:
+            return _finer(sample, plan)
     for name, values in sample.items():
         if _are_datetimes(values):
             return _plan(sample, name, "datetime", "date and time")
@@ -127,6 +121,29 @@ def guess_time(sample: Mapping[str, Sequence[str]]) -> TimePlan | None:
         return None
     unit, why = _unit_of("", rising)
     return _plan(sample, name, unit, why + ", the first column and rising")
+
+
+def _time_of(sample: Mapping[str, Sequence[str]], name: str) -> TimePlan | None:
+    """Return a column as the time of a table, None where it has no dates and does not rise."""
+    if _are_datetimes(sample[name]):
+        return _plan(sample, name, "datetime", "date and time")
+    numbers = _rising(sample[name], strict=False)
+    return None if numbers is None else _plan(sample, name, *_unit_of(_without_unit(name)[1], numbers))
+
+
+def _finer(sample: Mapping[str, Sequence[str]], plan: TimePlan) -> TimePlan:
+    """Return another column that may be the time where most rows repeat the time of a plan, and far fewer that of the other.
+
+    Dates are often written in whole seconds, beside a clock that counts milliseconds.
+    """
+    different = {name: len(set(values)) for name, values in sample.items() if has_time_word(name)}
+    coarse = len(set(sample[plan.column]))
+    if 2 * coarse > len(sample[plan.column]):
+        return plan
+    for name, count in different.items():
+        if name != plan.column and count >= 2 * coarse and (other := _time_of(sample, name)) is not None:
+            return replace(other, note=f'{other.note}, as most rows repeat the time of "{plan.column}"')
+    return plan
 
 
 def unit_doubt(numbers: NDArray[np.float64], unit: str) -> str:

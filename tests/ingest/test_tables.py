@@ -284,6 +284,22 @@ def test_time_column_is_guessed(sample: dict[str, list[str]], column: str, unit:
     assert (plan.column, plan.unit) == (column, unit)
 
 
+def test_dates_in_whole_seconds_give_way_to_a_clock_that_is_finer(tmp_path: Path) -> None:
+    seconds = [f"2024-04-25 20:48:{44 + k // 10}" for k in range(60)]
+    clock = [f"{1714049324781.1 + 92.0 * k:.4f}" for k in range(60)]
+    rows = [f"{one},{other},{k}" for k, (one, other) in enumerate(zip(seconds, clock, strict=True))]
+    path = tmp_path / "boat.csv"
+    path.write_text("\n".join(["Date,timeStamp,u", *rows]) + "\n", encoding="utf-8")
+    (topic,) = open_log(path).topics
+    assert 'column "timeStamp" (ms), as most rows repeat the time of "Date"' in topic.note
+    assert topic.start_ns is not None and abs(topic.start_ns - 1714049324781100000) < 1000
+    # A clock that stands still as often, and a counter without a word for time, are no better.
+    for others in ({"timeStamp": [one[:-5] for one in seconds]}, {"row": [str(k) for k in range(60)]}):
+        plan = guess_time({"Date": seconds, **others})
+        assert plan is not None and plan.column == "Date"
+        assert "repeat" not in plan.note
+
+
 def test_several_columns_that_may_be_the_time_are_listed() -> None:
     plan = guess_time({"u": ["1", "2"], "gps_week_time": ["1", "2"], "host_time": ["5", "6"]})
     assert plan is not None
