@@ -85,8 +85,7 @@ def inspect(
     topics = [
         _topic(topic, repaired[topic.name][2] if topic.name in repaired else None, problems) for topic in described
     ]
-    starts = [topic.start_ns for topic in described if topic.start_ns is not None]
-    ends = [topic.end_ns for topic in described if topic.end_ns is not None]
+    start_ns, end_ns, apart = _span(described)
     return {
         "schema": SCHEMA,
         "path": str(path),
@@ -94,12 +93,12 @@ def inspect(
         "format": _format_of(Path(path), reader),
         "files": [{"path": str(file), "bytes": _size(file)} for file in reader.paths],
         "sha256": sha256,
-        "start": _clock_time(min(starts)) if starts else None,
-        "duration_s": (max(ends) - min(starts)) * 1e-9 if starts and ends else 0.0,
+        "start": None if start_ns is None else _clock_time(start_ns),
+        "duration_s": 0.0 if start_ns is None or end_ns is None else (end_ns - start_ns) * 1e-9,
         "messages": sum(topic.count for topic in reader.topics),
         "topics": topics,
         "losses": [plain_loss(loss) for loss in reader.losses],
-        "notes": grouped_notes({topic["name"]: _notes(topic) for topic in topics}),
+        "notes": grouped_notes({topic["name"]: [*_notes(topic), *apart.get(topic["name"], ())] for topic in topics}),
         "vessel": vessel,
         "bundled": _bundled_matches(path, reader) if profile is None else [],
     }
@@ -140,6 +139,32 @@ def _timed(topic: Topic, series: Mapping[str, Series], repaired: Mapping[str, An
     if not len(receive_ns):
         return topic
     return replace(topic, start_ns=int(receive_ns.min()), end_ns=int(receive_ns.max()))
+
+
+def _span(topics: Sequence[Topic]) -> tuple[int | None, int | None, dict[str, tuple[str, ...]]]:
+    """Return start and end of a log [ns], and what is said of topics that neither counts.
+
+    The one message of a topic may carry the time of what was stated long before, or none. Where it is farther from all topics
+    with more than one than these last, the log does not begin or end with it.
+    """
+    known = [(topic, topic.start_ns, topic.end_ns) for topic in topics]
+    timed = [(topic, start, end) for topic, start, end in known if start is not None and end is not None]
+    several = [(start, end) for _, start, end in timed if end > start]
+    if not several:
+        spans = [(start, end) for _, start, end in timed]
+        return min((a for a, _ in spans), default=None), max((b for _, b in spans), default=None), {}
+    first, last = min(start for start, _ in several), max(end for _, end in several)
+    near = [(a, b) for _, a, b in timed if a >= 2 * first - last and b <= 2 * last - first]
+    apart = {
+        topic.name: (
+            f"its only time is {(first - end) * 1e-9:.3g} s before the others: start and duration of the log are without it"
+            if end < first
+            else f"its only time is {(start - last) * 1e-9:.3g} s after the others: the duration of the log is without it",
+        )
+        for topic, start, end in timed
+        if (start, end) not in near
+    }
+    return min(start for start, _ in near), max(end for _, end in near), apart
 
 
 def _topic(topic: Topic, clock: ClockReport | None, problems: Mapping[str, str]) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from ferryid.errors import FerryIdError
@@ -23,6 +24,7 @@ from ferryid.signals.recording import record
 from ferryid.signals.render import table
 from ferryid.vessel.load import load_profile
 from tests.damage import NAVIGATION, SURGE, changed, held_at_its_last, paused, stuck, ten_minutes, written
+from tests.ingest.autopilot_logs import ulog
 from tests.ingest.mcap_records import DATA_END, HEAD, T0, footer, message
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
@@ -34,6 +36,20 @@ def look(path: Path, profile: str | None = None) -> tuple[dict[str, Any], str]:
     for width in (80, 100, 240):
         assert max(map(len, render_inspect(result, width).splitlines())) <= width
     return result, render_inspect(result, 160)
+
+
+def test_a_log_does_not_begin_or_end_with_one_message_far_from_all_others(tmp_path: Path) -> None:
+    t = (np.arange(100) * 100_000 + 20_000_000).astype(np.uint64)
+    once = {"mission": 1_200_000_000, "test_motor": 2_000_000, "parameter_update": 0, "home_position": 19_500_000}
+    alone = {name: {"timestamp": np.array([at], np.uint64), "a": np.ones(1, np.float32)} for name, at in once.items()}
+    (tmp_path / "boat.ulg").write_bytes(
+        ulog({"vehicle_status": {"timestamp": t, "a": np.ones(100, np.float32)}, **alone})
+    )
+    result, text = look(tmp_path / "boat.ulg")
+    assert result["duration_s"] == pytest.approx(10.4)
+    assert "/mission: its only time is 1.17e+03 s after the others: the duration of the log is without it" in text
+    assert "/test_motor: its only time is 18 s before the others: start and duration of the log are without it" in text
+    assert "home_position: its only time" not in text
 
 
 @pytest.mark.slow
