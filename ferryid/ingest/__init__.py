@@ -11,6 +11,7 @@ from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 from ferryid.ingest import formats
 from ferryid.ingest.log import Format, Reader, TableLayout
+from ferryid.ingest.other_formats import unread_file, unread_text
 from ferryid.ingest.printable_names import printable_names
 
 __all__ = ["existing_parts", "log_suffixes", "open_log", "supported_formats"]
@@ -143,6 +144,11 @@ def _open_file(path: Path, layout: TableLayout | None) -> Reader:
     for entry in supported_formats():
         if entry.matches(path, head):
             return _opened(entry, path, layout)
+    other = unread_file(head) or unread_text(head.decode("latin-1").splitlines()[:1])
+    if other is not None:
+        raise FerryIdError(
+            f"{path}: not a log of a supported format, found {other[0]}. Fix: {other[1]}; {_supported_sentence()}"
+        )
     raise FerryIdError(
         f"{path}: not a log of a supported format, found a file that begins with {head[:12]!r}. "
         f"Fix: give a log; {_supported_sentence()}"

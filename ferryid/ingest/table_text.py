@@ -16,6 +16,7 @@ import numpy as np
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 from ferryid.ingest.log import TableLayout, Topic
+from ferryid.ingest.other_formats import unread_text
 from ferryid.ingest.table_rows import TextSheet, quoted
 from ferryid.ingest.table_time import TimePlan, guess_stamp, guess_time, looks_like_datetime
 from ferryid.ingest.tables import (
@@ -225,6 +226,12 @@ def _guessed(path: Path, lines: Sequence[str]) -> _Shape:
     """Guess the separator as the one that splits most lines into rows of one length."""
     best: tuple[int, float, int, str, str, int] | None = None
     sample = list(lines[:_SAMPLE_LINES])
+    filled = [line for line in sample if line.strip()]
+    other = unread_text(filled)
+    if other is not None:
+        raise FerryIdError(
+            f"{path}: this text is not a table of numbers, found {other[0]}: {quoted(filled[0])}. Fix: {other[1]}"
+        )
     for separator in (",", ";", "\t", "whitespace"):
         split = [_split(line, separator) for line in sample]
         decimal = _decimal_of(split, separator)
@@ -239,7 +246,6 @@ def _guessed(path: Path, lines: Sequence[str]) -> _Shape:
         rank = (count, share, width, separator, decimal, first)
         if best is None or rank[:3] > best[:3]:
             best = rank
-    filled = [line for line in sample if line.strip()]
     if best is None or best[0] * 10 < 6 * (len([line for line in sample[best[5] :] if line.strip()])):
         if len(filled) == 1 and any(len(_split(filled[0], separator)) > 1 for separator in (",", ";", "\t")):
             raise FerryIdError(f"{path}: the table holds a header and no rows. Fix: record or export the log again")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import gzip
 import io
 import math
 import subprocess
@@ -292,12 +293,12 @@ def test_dates_in_whole_seconds_give_way_to_a_clock_that_is_finer(tmp_path: Path
     path.write_text("\n".join(["Date,timeStamp,u", *rows]) + "\n", encoding="utf-8")
     (topic,) = open_log(path).topics
     assert 'column "timeStamp" (ms), as most rows repeat the time of "Date"' in topic.note
-    assert topic.start_ns is not None and abs(topic.start_ns - 1714049324781100000) < 1000
+    assert topic.start_ns == pytest.approx(1714049324781100000, abs=1000)
     # A clock that stands still as often, and a counter without a word for time, are no better.
     for others in ({"timeStamp": [one[:-5] for one in seconds]}, {"row": [str(k) for k in range(60)]}):
         plan = guess_time({"Date": seconds, **others})
-        assert plan is not None and plan.column == "Date"
-        assert "repeat" not in plan.note
+        assert plan is not None
+        assert (plan.column, "repeat" in plan.note) == ("Date", False)
 
 
 def test_several_columns_that_may_be_the_time_are_listed() -> None:
@@ -426,6 +427,43 @@ def test_what_cannot_be_used_is_refused_in_one_line(
     assert message.startswith(str(path))
     assert "Fix:" in message
     assert "\n" not in message
+
+
+NMEA = "$GNHDT,251.5847,T*13\r\n$GPVTG,278.601,T,282.034,M,0.12312,N,0.22802,K,D*34\r\n"
+DATAFLASH_TEXT = "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\nATT, 1000, 0.0, 1.2, 0.0, -2.1, 3.4, 5.6\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "expected"),
+    [
+        (
+            "a.txt",
+            "888,T,177.3,M,0.14,N,0.26,K,D*39\n" + 5 * NMEA,
+            r"found sentences of NMEA 0183.*Fix: convert them to a table",
+        ),
+        ("a.nmea", NMEA, "found sentences of NMEA 0183.*Fix: convert them to a table"),
+        (
+            "a.csv",
+            "".join(f"2023-09-01 15:56:44 | {one}\n" for one in 3 * NMEA.split("\r\n")[:2]),
+            "sentences of NMEA 0183",
+        ),
+        (
+            "a.log",
+            DATAFLASH_TEXT + "RCOU, 1000, 1500, 1500, 1600\n" * 9,
+            r"ArduPilot as text.*Fix: take the binary log",
+        ),
+        ("a.tlog", (1693609000000000).to_bytes(8, "big") + b"\xfd\x1f\x00\x00" + bytes(60), "telemetry log of MAVLink"),
+        ("a.ulg.gz", gzip.compress(b"ULog" * 100), "packed by gzip.*Fix: unpack it"),
+        ("a.xlsx", b"PK\x03\x04\x14\x00\x06\x00" + bytes(22) + b"[Content_Types].xml" + bytes(90), "workbook.*as CSV"),
+    ],
+)
+def test_recordings_of_other_kinds_are_named_in_the_refusal(
+    tmp_path: Path, name: str, content: str | bytes, expected: str
+) -> None:
+    (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+    with pytest.raises(FerryIdError, match=expected) as error:
+        open_log(tmp_path / name)
+    assert len(str(error.value).splitlines()) == 1
 
 
 def test_misspelt_column_gets_the_nearest_name(tmp_path: Path) -> None:
