@@ -47,8 +47,14 @@ _DEFINITIONS = frozenset({"FMT", "UNIT", "MULT", "FMTU", "PARM", "FILE"})
 """What a log states of itself once, and files that are kept in it: no signals."""
 _CHAIN = 4
 """Heads in a row by which messages are recognised again after a damaged stretch."""
-_GPS_EPOCH_S, _WEEK_S, _LEAP_S = 315_964_800, 604_800, 18
-"""GPS time began on 1980-01-06, and has been ahead of UTC by 18 s since 2017."""
+_GPS_EPOCH_S, _WEEK_S = 315_964_800, 604_800
+"""GPS time began on 1980-01-06 [s since 1970]."""
+_LEAPS = {1_230_768_000: 15, 1_341_100_800: 16, 1_435_708_800: 17, 1_483_228_800: 18}
+"""From which time on [s since 1970] GPS time is ahead of UTC by how much [s]."""
+_OF_GPS = frozenset({"TimeMS", "Week"})
+"""Fields of the receivers until 2014: their TimeMS counts from the begin of the week, and T has the autopilot's clock [ms]."""
+_WEEKS = (("GWk", "GMS"), ("Week", "TimeMS"))
+"""Names of week and milliseconds of the week."""
 
 
 @dataclass(frozen=True)
@@ -198,10 +204,11 @@ def _whole(layout: _Layout, places: NDArray[np.int64]) -> RecordTable | None:
             dtype, divisor = _TYPES[letter]
             fields[label] = RecordField(at, np.dtype(dtype), divisor)
         at += _size(letter)
-    clock = next((name for name in _TIMES if name in fields and fields[name].dtype.kind in "iu"), None)
+    units: Mapping[str, int] = {"T": 1_000_000} if fields.keys() >= _OF_GPS else _TIMES
+    clock = next((name for name in units if name in fields and fields[name].dtype.kind in "iu"), None)
     if clock is None:
         return None
-    return RecordTable(instance_name(layout.name, 0), layout.name, fields, places, clock, _TIMES[clock])
+    return RecordTable(instance_name(layout.name, 0), layout.name, fields, places, clock, units[clock])
 
 
 def _timeless(path: Path, scan: _Scan) -> list[Loss]:
@@ -209,7 +216,9 @@ def _timeless(path: Path, scan: _Scan) -> list[Loss]:
     return [
         Loss(
             str(path),
-            f"no field of its definition is a time ({' or '.join(_TIMES)}): {', '.join(layout.labels)}",
+            f"no field of its definition is a time of the autopilot ({' or '.join(_TIMES)}"
+            f"{', but here TimeMS is the time of the week' if set(layout.labels) >= _OF_GPS else ''}): "
+            f"{', '.join(layout.labels)}",
             topic=instance_name(layout.name, 0),
             messages=len(places),
         )
@@ -290,11 +299,14 @@ def _chained(raw: bytes, position: int, sizes: Mapping[int, int]) -> bool:
 def _utc(data: NDArray[np.uint8], tables: list[RecordTable]) -> int | None:
     """Return by how much UTC is later than the autopilot's clock [ns], by its receivers; None where none knew it."""
     for table in tables:
-        if table.type != "GPS" or not {"GMS", "GWk"} <= table.fields.keys():
+        names = next((names for names in _WEEKS if set(names) <= table.fields.keys()), None)
+        if table.type != "GPS" or names is None:
             continue
         clock = column_of(data, table, table.time).astype(float) * (table.time_ns * 1e-9)
-        weeks, ms = (column_of(data, table, name).astype(float) for name in ("GWk", "GMS"))
-        known = np.where(weeks > 0, _GPS_EPOCH_S - _LEAP_S + weeks * _WEEK_S + ms * 1e-3, 0.0)
+        weeks, ms = (column_of(data, table, name).astype(float) for name in names)
+        by_gps = _GPS_EPOCH_S + weeks * _WEEK_S + ms * 1e-3
+        ahead = np.asarray([0, *_LEAPS.values()])[np.searchsorted(list(_LEAPS), by_gps, side="right")]
+        known = np.where(weeks > 0, by_gps - ahead, 0.0)
         if (offset := utc_offset_ns(clock, known)) is not None:
             return offset
     return None

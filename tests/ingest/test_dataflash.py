@@ -164,3 +164,36 @@ def test_parameters_without_a_number_are_kept_and_those_without_a_name_are_not(t
     assert set(found) == {"SERVO1_MIN", "SERVO2_MIN"}
     # Who asks for it is to say so.
     assert np.isnan(found["SERVO2_MIN"].values).tolist() == [True]
+
+
+def of_2014(labels: str, letters: str, *clock: int) -> bytes:
+    """A log as of 2014, whose receiver states the time of the week as TimeMS."""
+    log = DataFlash()
+    log.define("ATT", "Icc", "TimeMS,Roll,Yaw")
+    log.define("GPS", letters, labels)
+    for k in range(100):
+        log.add("ATT", 313_000 + 100 * k, 0, 100 * k)
+        log.add("GPS", 3, 580_013_000 + 100 * k, 1814, 634_000_000, *(one + 100 * k for one in clock))
+    return log.content
+
+
+def test_a_receiver_of_2014_is_on_the_clock_of_the_autopilot(tmp_path: Path) -> None:
+    (tmp_path / "boat.bin").write_bytes(of_2014("Status,TimeMS,Week,Lat,T", "BIHLI", 313_040))
+    reader = open_log(tmp_path / "boat.bin")
+    gps, attitude = (next(one for one in reader.topics if one.name == name) for name in ("/GPS", "/ATT"))
+    assert gps.start_ns is not None
+    assert attitude.start_ns is not None
+    assert gps.start_ns - attitude.start_ns == 40_000_000
+    # 2014-10-18, when GPS time was ahead of UTC by 16 s.
+    assert np.datetime64(gps.start_ns, "ns") == np.datetime64("2014-10-18T17:06:37")
+    assert "TimeMS" in gps.fields
+    assert not reader.losses
+
+
+def test_a_receiver_that_states_the_time_of_the_week_alone_is_lost_and_counted(tmp_path: Path) -> None:
+    (tmp_path / "boat.bin").write_bytes(of_2014("Status,TimeMS,Week,Lat", "BIHL"))
+    reader = open_log(tmp_path / "boat.bin")
+    assert [one.name for one in reader.topics] == ["/ATT"]
+    (loss,) = reader.losses
+    assert (loss.topic, loss.messages) == ("/GPS", 100)
+    assert "here TimeMS is the time of the week" in loss.what
