@@ -84,6 +84,12 @@ _UNRELATED = frozenset(
         "wrench",
         "tau",
         "reset",
+        "usbl",
+        "sonar",
+        "lidar",
+        "radar",
+        "antenna",
+        "camera",
     ]
 )
 _MARKS = frozenset(
@@ -209,11 +215,13 @@ def parted(shared: SharedTopic, samples: Samples) -> tuple[list[ActuatorField], 
 
 
 def _split(words: Sequence[str]) -> tuple[str, ...]:
-    """Part what is written as one: a side before pwm."""
+    """Part what is written as one: a side before pwm, the mark of an order before rudder."""
     parted: list[str] = []
     for word in words:
         if match := re.fullmatch(r"(l|r|left|right)(pwm|rpm|thruster|motor)", word):
             parted += [{"l": "left", "r": "right"}.get(match[1], match[1]), match[2]]
+        elif match := re.fullmatch(r"(cmd|ref)(rudder|throttle|thrust|thruster|motor|rpm|pwm|azimuth)", word):
+            parted += [match[1], match[2]]
         else:
             parted.append(word)
     return tuple(parted)

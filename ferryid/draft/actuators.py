@@ -133,13 +133,15 @@ def _signal(
     values = values[np.isfinite(values)]
     largest = float(np.quantile(np.abs(values), 0.99)) if values.size else 0.0
     is_output = re.fullmatch(r"output[0-9]+", name) is not None
-    low = float(np.quantile(values, 0.01)) if values.size else 0.0
+    # An output that is off has pulses of zero.
+    on = values[values != 0.0] if role == "duty" else values
+    low = float(np.quantile(on, 0.01)) if on.size else 0.0
     unit, why, doubt = _unit(role, field, largest, low)
     stated = field.setting or OutputSetting()
     shown = "an order, by its name" if order else "feedback, by its name" if field.order is False else ""
     if measured:
         shown = "feedback, as another field of the actuator is the order"
-    evidence = (*filter(None, [shown]), *stated.evidence, why if stated.in_pulses else f"{unit}: {why}")
+    evidence = (*filter(None, [shown]), *stated.evidence, why if stated.in_pulses else f"in {unit}: {why}")
     return MappedSignal(
         f"{name}.{quantity}{'.command' if order else ''}",
         field.topic,

@@ -115,6 +115,9 @@ ACTUATORS = frozenset(
         "engine",
     ]
 )
+_UNIT_WORDS = frozenset(
+    {"deg", "degrees", "rad", "m", "meters", "mps", "kn", "kt", "kts", "knots", "rads", "radps", "degps"}
+)
 _PAIRS: Mapping[str, tuple[tuple[str, str], ...]] = {
     "position": (("n", "e"), ("north", "east"), ("northing", "easting"), ("xn", "yn"), ("pn", "pe")),
     "velocity": (
@@ -200,7 +203,9 @@ def _of_topic(topic: Topic, around: set[str], fields: Mapping[str, tuple[str, ..
         groups.setdefault(stem, {}).setdefault(axis, path)
     # Columns of a table share no stem: what names the axes of one vector lies in several.
     table = topic.encoding == "table"
-    every = {axis: path for axes in groups.values() for axis, path in reversed(axes.items())}
+    # The shortest name of an axis is that of the quantity itself, not of its derivative or difference.
+    longest_first = sorted(groups.items(), key=lambda one: -len(one[0]))
+    every = {axis: path for _, axes in longest_first for axis, path in reversed(axes.items())}
     found: list[tuple[str, tuple[str, ...], str]] = []
     for stem, axes in groups.items():
         what = set(stem) | around
@@ -212,14 +217,16 @@ def _of_topic(topic: Topic, around: set[str], fields: Mapping[str, tuple[str, ..
         for first, second in pairs:
             if {first, second} <= every.keys():
                 found.append((kind, (every[first], every[second]), ""))
-    for names in (("latitude", "longitude"), ("lat", "lon"), ("lat", "lng")):
+    for names in (("latitude", "longitude"), ("lat", "lon"), ("lat", "lng"), ("lat", "long")):
         if set(names) <= every.keys():
             found.append(("position", (every[names[0]], every[names[1]]), "geodetic"))
             break
     alone = len(fields) == 1
     for path, words in fields.items():
         said = set(words) | (around if alone else set())
-        if (said & HEADING and not said & RATES and words[-1] not in ("x", "y", "z", "w", "d", "dot", "rate")) or (
+        if said & HEADING and set(words) & SPEEDS:
+            found.append(("yaw_rate", (path,), ""))
+        elif (said & HEADING and not said & RATES and words[-1] not in ("x", "y", "z", "w", "d", "dot", "rate")) or (
             words[-1] == "theta" and {"x", "y"} <= every.keys() and not {"psi", "yaw", "phi"} & every.keys()
         ):
             found.append(("heading", (path,), ""))
@@ -253,8 +260,10 @@ def _vectors(
 
 
 def _axis(words: tuple[str, ...]) -> tuple[str, tuple[str, ...]]:
-    """Return the word that names an axis, the last or else the first, and the others."""
-    short = {"x", "y", "z", "w", "n", "e", "u", "v", "r", "vm", "psi", "theta"}
+    """Return the word that names an axis, the last but for units or else the first, and the others."""
+    short = {"x", "y", "z", "w", "n", "e", "u", "v", "r", "vm", "psi", "theta", "surge", "sway"}
+    while len(words) > 1 and words[-1] in _UNIT_WORDS:
+        words = words[:-1]
     if (words and words[-1] in short) or len(words) < 2:
         return (words[-1] if words else ""), words[:-1]
     if words[0] in short:

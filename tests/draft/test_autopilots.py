@@ -182,6 +182,15 @@ def test_outputs_are_found_by_their_names_of_2014(trial: Columns, tmp_path: Path
     assert fields == {"output1.speed.command": ("Ch1",), "output3.speed.command": ("Ch3",)}
 
 
+def test_an_output_that_is_off_at_times_is_still_in_pulses(trial: Columns, tmp_path: Path) -> None:
+    off = trial["t"] < 10.0
+    pulses = {1: np.where(off, 0.0, 1500.0 + 500.0 * trial["rudder"]), 3: 1500.0 + 0.3 * trial["n"]}
+    (tmp_path / "boat.bin").write_bytes(ardupilot(trial, outputs=pulses))
+    found = {one.quantity: one for one in draft_profile(tmp_path / "boat.bin").every}
+    assert found["output1.speed.command"].unit == "us"
+    assert any(one.startswith("in us: 99 %") for one in found["output1.speed.command"].evidence)
+
+
 @pytest.mark.parametrize("name", ["boat.ulg", "boat.bin"])
 def test_an_answered_draft_is_a_profile_that_reads_its_log(trial: Columns, tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_bytes(px4(trial) if name.endswith("ulg") else ardupilot(trial))

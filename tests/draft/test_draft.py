@@ -137,6 +137,14 @@ def test_latitude_and_longitude_in_radians(tmp_path: Path) -> None:
     assert (found["position"].unit, found["velocity"].unit, found["velocity"].frame) == ("rad", "m/s", "ENU")
 
 
+@pytest.mark.parametrize("names", [("lat", "long"), ("Lat", "Lng"), ("lat_deg", "lon_deg")])
+def test_latitude_and_longitude_by_their_short_names(tmp_path: Path, names: tuple[str, str]) -> None:
+    columns = in_latitude_and_enu(sailed())
+    short = dict(zip(("latitude", "longitude"), names, strict=True))
+    _, found = drafted(tmp_path, {short.get(name, name): values for name, values in columns.items()})
+    assert (found["position"].fields, found["position"].frame) == (names, "geodetic")
+
+
 def test_a_rudder_that_is_positive_to_port_has_its_sign_reversed(tmp_path: Path) -> None:
     _, found = drafted(tmp_path, in_degrees_and_knots(sailed()))
     assert (found["propeller.rudder"].sign, found["propeller.rudder"].unit) == (-1.0, "deg")
@@ -155,6 +163,39 @@ def test_what_motion_does_not_show_is_to_be_checked(tmp_path: Path) -> None:
     _, found = drafted(tmp_path, columns)
     assert not found["heading"].doubts
     assert any("order" in one for one in found["propeller.speed"].doubts)
+
+
+def test_velocities_of_surge_sway_and_yaw_are_found_by_these_names(tmp_path: Path) -> None:
+    c = in_ned(sailed())
+    named = {"u": "surge_vel", "v": "sway_vel", "r": "yaw_vel", "psi": "yaw"}
+    columns = {named.get(name, name): values for name, values in c.items()}
+    step = np.gradient(c["t"])
+    columns |= {f"{named[name]}_derivated": np.gradient(c[name]) / step for name in ("u", "v", "r")}
+    _, found = drafted(tmp_path, columns)
+    assert found["velocity"].fields == ("surge_vel", "sway_vel")
+    assert found["yaw_rate"].fields == ("yaw_vel",)
+    assert found["heading"].fields == ("yaw",)
+
+
+def test_names_may_end_in_their_unit(tmp_path: Path) -> None:
+    c = in_ned(sailed())
+    named = {"N": "north_m", "E": "east_m", "u": "u_mps", "v": "v_mps"}
+    _, found = drafted(tmp_path, {named.get(name, name): values for name, values in c.items()})
+    assert (found["position"].fields, found["position"].frame) == (("north_m", "east_m"), "NED")
+    assert found["velocity"].fields == ("u_mps", "v_mps")
+
+
+def test_the_azimuth_of_a_positioning_system_is_no_thruster(tmp_path: Path) -> None:
+    columns = in_ned(sailed())
+    bearing = {"/usbl_data/azimuth": np.degrees(np.arctan2(columns["E"], columns["N"] + 30.0))}
+    draft, _ = drafted(tmp_path, columns | bearing)
+    assert [one.name for one in draft.actuators] == ["propeller"]
+
+
+def test_an_order_written_as_one_word_with_its_rudder_is_found(tmp_path: Path) -> None:
+    columns = {{"rudder": "cmdrudder"}.get(name, name): values for name, values in in_ned(sailed()).items()}
+    _, found = drafted(tmp_path, columns)
+    assert found["propeller.rudder.command"].fields == ("cmdrudder",)
 
 
 def test_a_velocity_that_no_unit_explains_is_to_be_checked(tmp_path: Path) -> None:
