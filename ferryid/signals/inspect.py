@@ -155,7 +155,7 @@ def _span(topics: Sequence[Topic]) -> tuple[int | None, int | None, dict[str, tu
         return min((a for a, _ in spans), default=None), max((b for _, b in spans), default=None), {}
     first, last = min(start for start, _ in several), max(end for _, end in several)
     near = [(a, b) for _, a, b in timed if a >= 2 * first - last and b <= 2 * last - first]
-    apart = {
+    apart: dict[str, tuple[str, ...]] = {
         topic.name: (
             f"its only time is {(first - end) * 1e-9:.3g} s before the others: start and duration of the log are without it"
             if end < first

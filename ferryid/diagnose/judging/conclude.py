@@ -21,7 +21,7 @@ from ferryid.diagnose.judging.campaign import JudgedCampaign
 from ferryid.diagnose.judging.campaign_posterior import campaign_posterior
 from ferryid.diagnose.judging.claims import Claim, Key, LogFigures
 from ferryid.diagnose.judging.confidence_rules import apply_rules, lasting, log_notes
-from ferryid.diagnose.judging.credibility import refitted_hull
+from ferryid.diagnose.judging.credibility import RefittedHull, impossible_throughout, refitted_hull
 from ferryid.diagnose.judging.detection_power import (
     detection_powers,
     is_testable,
@@ -30,6 +30,7 @@ from ferryid.diagnose.judging.detection_power import (
     untested_notes,
 )
 from ferryid.diagnose.judging.diagnosis import Diagnosis
+from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.free_runs import FreeRuns
 from ferryid.diagnose.judging.held_out import HeldOutEvidence, Improvement
 from ferryid.diagnose.judging.hidden_signal import compare_hidden_signals
@@ -37,7 +38,7 @@ from ferryid.diagnose.judging.judge import JudgedLog, sensor_claims
 from ferryid.diagnose.judging.least_sizes import least_sizes
 from ferryid.diagnose.judging.likeness import likeness_of_logs
 from ferryid.diagnose.judging.locate import locate, locate_between
-from ferryid.diagnose.judging.posterior import posterior_of
+from ferryid.diagnose.judging.posterior import Posterior, posterior_of
 from ferryid.diagnose.judging.verdict import Remainder, verdict_of
 from ferryid.types import AXES, Floats
 
@@ -193,7 +194,7 @@ def _concluded(
         weighed=shared.weighed,
         common_hull_doubt=shared.common_hull_doubt,
     )
-    findings, rule_notes = apply_rules(claims, figures)
+    findings, rule_notes, posterior = _confident(claims, figures, log)
     chances, still = detection_powers(problem, kept, selected.steady), unexcited_axes(problem)
     before, after = _scores(problem, log.base, kept, stands.proof)
     mse = after["mse"]
@@ -224,7 +225,6 @@ def _concluded(
         *untested_notes(selected.search.untested),
         *recording_advice(chances, still, measurements.profile.setting),
     )
-    updates = estimated.baseline.updates_model
     return Diagnosis(
         survey.motion.log,
         measurements.profile.name,
@@ -240,12 +240,39 @@ def _concluded(
         moved=refitted_hull(problem, kept).farthest if kept.candidates else None,
         duration_s=_duration_s(screened),
         left_out=survey.motion.left_out,
-        posterior=posterior_of(problem, kept, selected.search.states, findings, survey, known=figures.hull_known)
-        if updates
-        else None,
+        posterior=posterior,
         remainder=remainder,
         least_sizes=least_sizes(problem, kept, chances, {one.key for one in findings}),
     )
+
+
+def _confident(
+    claims: Sequence[Claim], figures: LogFigures, log: JudgedLog
+) -> tuple[tuple[Finding, ...], tuple[str, ...], Posterior | None]:
+    """Return findings as the confidence rules leave them, notes, and the posterior that the sure ones lead to.
+
+    The hull is refitted beside the sure findings alone. Where nobody modelled it and no axis has an inertia that is possible
+    then, the doubtful ones had made up for forces that are not the vessel's, and the sure ones rest on the same forces.
+    """
+    selected = log.selected
+    problem, screened = selected.search.problem, selected.estimated.averaged.screened
+
+    def judged() -> tuple[tuple[Finding, ...], tuple[str, ...], Posterior | None]:
+        findings, notes = apply_rules(claims, figures)
+        if not selected.estimated.baseline.updates_model:
+            return findings, notes, None
+        survey, states, known = screened.measured.survey, selected.search.states, figures.hull_known
+        return findings, notes, posterior_of(problem, log.stands.fit, states, findings, survey, known=known)
+
+    first = judged()
+    hull = None if first[2] is None else first[2].hull
+    if hull is None or figures.hull_known or figures.hull_doubt:
+        return first
+    impossible = RefittedHull(impossible=impossible_throughout(screened.measurements.profile, hull.mean))
+    if not impossible.doubt:
+        return first
+    figures = replace(figures, hull_doubt=impossible.doubt)
+    return judged()
 
 
 def survey_notes(log: ScreenedLog) -> tuple[str, ...]:

@@ -66,17 +66,18 @@ class RefittedHull:
 def refitted_hull(problem: EstimationProblem, kept: Fit, *, known: bool = True) -> RefittedHull:
     """Return what a fit made of the hull; factors on single coefficients are multiplied into its inertia.
 
-    Of a hull that is not `known`, as nobody has modelled it, what little a log may determine of the inertia is no doubt.
+    Of a hull that is not `known`, as nobody has modelled it, what little a log may determine of the inertia is no doubt, unless
+    no axis has an inertia that is possible: then the forces are not those of the vessel, and any finding may make up for them.
     """
     hull = kept.hull.copy()
     for candidate, values in zip(kept.candidates, kept.values, strict=True):
         if candidate.effect.id == IN_THE_HULL:
             for one, factor in zip(candidate.parameters, values.tolist(), strict=True):
                 hull[COEFFICIENTS.index(one.name)] *= factor
-    before, spread = problem.plain.hull, problem.hull_spread
+    before, spread, profile = problem.plain.hull, problem.hull_spread, problem.plain.measurements.profile
     return RefittedHull(
         _farthest(before, spread, kept.hull),
-        impossible_masses(problem.plain.measurements.profile, hull) if known else (),
+        impossible_masses(profile, hull) if known else impossible_throughout(profile, hull),
     )
 
 
@@ -103,6 +104,18 @@ def _farthest(before: Floats, spread: Floats, moved: Floats) -> HullChange | Non
 def impossible_masses(profile: Profile, hull: Floats) -> tuple[str, ...]:
     """Return why no hull can have the masses of these coefficients, shape (26,), as a fit judges them, in sentences."""
     return tuple(one.reason for one in inertia_checks(profile, mass_of(hull)) if not one.passed)
+
+
+def impossible_throughout(profile: Profile, hull: Floats) -> tuple[str, ...]:
+    """Return why none of the three inertias of these coefficients is possible, in a sentence; empty where one is."""
+    shares = [one for one in inertia_checks(profile, mass_of(hull)) if one.name.startswith("inertia")]
+    if any(one.passed for one in shares):
+        return ()
+    listed = ", ".join(f"{one.value:.2g}" for one in shares)
+    return (
+        f"The effective inertia in surge, sway and yaw is {listed} times the rigid body's, which no hull has: places, "
+        "directions or thrust curves of the actuators, or the unit of their signals, are not those of the vessel.",
+    )
 
 
 def value_doubt(effect: Effect, parameters: Sequence[Parameter], values: Mapping[str, float], profile: Profile) -> str:

@@ -11,6 +11,7 @@ import pytest
 
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.thresholds import INFERENCE
+from ferryid.diagnose.judging import conclude
 from ferryid.diagnose.judging.campaign_conditions import ConditionTest
 from ferryid.diagnose.judging.campaign_evidence import Gain, HeldOutLoss
 from ferryid.diagnose.judging.campaign_properties import PropertyTest
@@ -84,12 +85,12 @@ def test_a_hull_about_an_origin_at_the_stern_reaches_farther_ahead() -> None:
     assert off_hull(astern, 1.01 * LENGTH, 0.0) != ""
 
 
-def fitted(hull: Any, *candidates: Any) -> RefittedHull:
+def fitted(hull: Any, *candidates: Any, known: bool = True) -> RefittedHull:
     problem = SimpleNamespace(
         plain=SimpleNamespace(hull=HULL, measurements=SimpleNamespace(profile=FERRY)), hull_spread=SPREAD
     )
     kept = SimpleNamespace(hull=hull, candidates=[one for one, _ in candidates], values=[p for _, p in candidates])
-    return refitted_hull(cast(Any, problem), cast(Any, kept))
+    return refitted_hull(cast(Any, problem), cast(Any, kept), known=known)
 
 
 def moved(coefficient: str, deviations: float) -> Any:
@@ -108,6 +109,42 @@ def test_a_hull_that_moves_ten_deviations_or_is_lighter_than_the_vessel_is_doubt
     # The factor alone is that much below the model's, which has added mass.
     values[[one.name for one in factors.parameters].index("m11")] = MASS / HULL[0]
     assert fitted(HULL, (factors, values)).doubt == ""
+
+
+def test_a_hull_that_nobody_modelled_is_doubted_where_no_axis_has_a_possible_inertia() -> None:
+    def heavy(*names: str) -> Any:
+        return HULL * np.where(np.isin(COEFFICIENTS, names), 9.0, 1.0)
+
+    assert fitted(heavy("m11", "m22"), known=False).impossible == ()
+    (why,) = fitted(heavy("m11", "m22", "m33"), known=False).impossible
+    assert "which no hull has: places, directions or thrust curves" in why
+    # One that was modelled is doubted for any axis.
+    assert len(fitted(heavy("m11", "m22")).impossible) == 2
+
+
+@pytest.mark.parametrize(
+    ("heavy", "known", "sure"),
+    [(("m11", "m22", "m33"), False, False), (("m11", "m22"), False, True), (("m11", "m22", "m33"), True, True)],
+)
+def test_what_sets_in_is_a_hint_where_the_hull_beside_the_sure_findings_cannot_be(
+    monkeypatch: pytest.MonkeyPatch, heavy: tuple[str, ...], known: bool, sure: bool
+) -> None:
+    hull = HULL * np.where(np.isin(COEFFICIENTS, heavy), 9.0, 1.0)
+
+    def posterior(*given: Any, **_: Any) -> Any:
+        return SimpleNamespace(hull=SimpleNamespace(mean=hull)) if any(one.sure for one in given[3]) else None
+
+    monkeypatch.setattr(conclude, "posterior_of", posterior)
+    screened = SimpleNamespace(measurements=SimpleNamespace(profile=FERRY), measured=SimpleNamespace(survey=None))
+    estimated = SimpleNamespace(
+        averaged=SimpleNamespace(screened=screened), baseline=SimpleNamespace(updates_model=True)
+    )
+    selected = SimpleNamespace(search=SimpleNamespace(problem=None, states=()), estimated=estimated)
+    log = SimpleNamespace(selected=selected, stands=SimpleNamespace(fit=None))
+    claim = Claim(found("thruster_gain"), Figures("force", sets_in=True))
+    (one,), notes, made = conclude._confident([claim], LogFigures(hull_known=known), cast(Any, log))
+    assert (one.sure, made is not None) == (sure, sure)
+    assert any("which no hull has" in note for note in notes) != sure
 
 
 def test_the_hull_of_a_campaign_is_doubted_as_that_of_a_log_is() -> None:
