@@ -31,7 +31,12 @@ def wrong_way(response: Floats, spread: Floats, profile: str) -> str:
         "base model expects"
         for axis in wrong
     )
-    if 0 in wrong:
+    if max(-response[axis] for axis in wrong) < IDENTIFY.opposite:
+        cause = "the motion hardly follows the applied force at all, rather than going against it"
+        remedy = (
+            "check which signal drives which actuator, position_m and angle_deg of each, and the unit of their signals"
+        )
+    elif 0 in wrong:
         cause = "the thrust or the surge velocity has the wrong sign"
         remedy = "change the sign of the thrust curve or of the actuators' signals, or the frame of the velocity"
     elif 1 in wrong:

@@ -152,6 +152,12 @@ class IdentifyThresholds:
         "by which an acceleration goes against the applied force before a fit is refused",
         "derived: one in a hundred by chance",
     )
+    opposite: float = threshold(
+        0.2,
+        "of what the base model expects",
+        "an acceleration that goes against the applied force by less does not show a sign that is reversed",
+        "derived: a reversed sign gives minus one over the share of added mass, and no inertia is above 5",
+    )
     pose_agreement: float = threshold(
         0.5,
         "-",

@@ -16,6 +16,7 @@ from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.effects.hull_spread import default_hull_spread
 from ferryid.errors import FerryIdError
 from ferryid.identify import inputs
+from ferryid.identify.contradictions import wrong_way
 from ferryid.identify.estimation import estimate_correction
 from ferryid.identify.feasible import Feasible, _nearest, feasible_gains
 from ferryid.identify.motion_data import compute_residuals
@@ -345,6 +346,16 @@ def test_forces_that_act_the_wrong_way_are_refused_with_their_cause(
         match=rf"accelerates the vessel in .* of what the base model expects.*{cause}.* Fix: in the profile",
     ):
         data_of(turned).refuse_contradictions()
+
+
+def test_forces_that_are_hardly_followed_are_not_taken_for_reversed_ones() -> None:
+    spread = np.array([0.007, 0.02, 0.009])
+    said = wrong_way(np.array([0.008, -0.047, -0.016]), spread, "the profile boat")
+    assert "the motion hardly follows the applied force at all" in said
+    assert "which signal drives which actuator, position_m and angle_deg" in said
+    assert "opposite sides" not in said
+    assert "opposite sides" in wrong_way(np.array([0.9, -0.3, 0.8]), spread, "the profile boat")
+    assert wrong_way(np.array([0.008, -0.03, 0.5]), spread, "the profile boat") == ""
 
 
 @pytest.mark.slow
