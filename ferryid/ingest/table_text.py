@@ -18,7 +18,7 @@ from ferryid.errors import FerryIdError
 from ferryid.ingest.log import TableLayout, Topic
 from ferryid.ingest.other_formats import unread_text
 from ferryid.ingest.table_rows import TextSheet, quoted
-from ferryid.ingest.table_time import TimePlan, guess_stamp, guess_time, looks_like_datetime
+from ferryid.ingest.table_time import TimePlan, guess_stamp, guess_time, looks_like_clock_time, looks_like_datetime
 from ferryid.ingest.tables import (
     no_time,
     number_doubt,
@@ -194,7 +194,11 @@ def _is_number(text: str, decimal: str) -> bool:
 def _is_measured(text: str, decimal: str) -> bool:
     """True for a number or a time, but not for the 1 that stands for a unit."""
     bare = text.strip()
-    return bare not in ("", "1") and (_is_number(bare, decimal) or looks_like_datetime(bare))
+    return bare not in ("", "1") and (_is_number(bare, decimal) or _is_time(bare))
+
+
+def _is_time(text: str) -> bool:
+    return looks_like_datetime(text) or looks_like_clock_time(text)
 
 
 def _values_in(fields: Sequence[str], decimal: str) -> int:
@@ -205,7 +209,7 @@ def _values_in(fields: Sequence[str], decimal: str) -> int:
     for field in fields:
         bare = field.strip()
         # Most are numbers, and those are found fastest.
-        if _is_number(bare, decimal) or looks_like_datetime(bare):
+        if _is_number(bare, decimal) or _is_time(bare):
             values, measured = values + 1, True
         elif bare.lower() in _WORDS:
             values += 1

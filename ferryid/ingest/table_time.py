@@ -18,6 +18,8 @@ _READABLE = 0.75
 _PREFIX = {3: "milli", 6: "micro", 9: "nano"}
 UNIT_NS = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1_000, "ns": 1}
 _DATETIME = re.compile(r"\s*\d{4}[-/.]\d{2}[-/.]\d{2}[ T]\d{2}:\d{2}:\d{2}([.,]\d*)?\s*(Z|[+-]\d{2}:?\d{2})?\s*$")
+_CLOCK = re.compile(r"\s*\d{1,2}:\d{2}:\d{2}([.,]\d*)?\s*$")
+_HALF_DAY_NS = 43_200 * 1_000_000_000
 _TIME_NAME = re.compile(
     r"%?(rosbag|log|gps|unix|epoch|utc|receive|recv|elapsed|rec)?[ _.]*"
     r"(t|tvec|times?|timestamp|stamp|date|date[ _]?time|utc|secs?|seconds|zeit|tid|temps)(?:[ _.]*(\d|abs|rel|utc))?$"
@@ -83,6 +85,11 @@ def looks_like_datetime(text: str) -> bool:
     return _DATETIME.match(text) is not None
 
 
+def looks_like_clock_time(text: str) -> bool:
+    """Return True for a time of day without a date, ``11:15:45.313``."""
+    return _CLOCK.match(text) is not None
+
+
 def guess_time(sample: Mapping[str, Sequence[str]]) -> TimePlan | None:
     """Guess the time column from names and a sample of the rows, None where nothing looks like one.
 
@@ -127,6 +134,8 @@ def _time_of(sample: Mapping[str, Sequence[str]], name: str) -> TimePlan | None:
     """Return a column as the time of a table, None where it has no dates and does not rise."""
     if _are_datetimes(sample[name]):
         return _plan(sample, name, "datetime", "date and time")
+    if _are_clock_times(sample[name]):
+        return _plan(sample, name, "datetime", "time of day, of which date is not known")
     numbers = _rising(sample[name], strict=False)
     return None if numbers is None else _plan(sample, name, *_unit_of(_without_unit(name)[1], numbers))
 
@@ -255,7 +264,9 @@ def stamps_to_ns(seconds: Column, nanoseconds: Column) -> tuple[Nanoseconds, NDA
 
 
 def datetimes_to_ns(texts: Sequence[str]) -> tuple[Nanoseconds, NDArray[np.bool_], str]:
-    """Parse dates and times, year first, without losing nanoseconds; no zone is taken as UTC.
+    """Parse dates and times, year first, or times of day, without losing nanoseconds; no zone is taken as UTC.
+
+    Times of day count from midnight before the first, and go on beyond the next.
 
     Some exporters write the fraction as an unpadded count of nanoseconds (``45.81833647`` for 45.081833647 s). Where
     fractions differ in length, both readings are tried and the one with fewer steps back in time is kept.
@@ -266,6 +277,13 @@ def datetimes_to_ns(texts: Sequence[str]) -> tuple[Nanoseconds, NDArray[np.bool_
         Times [ns], shape (n,), 0 where unreadable; a mask, True where readable; a sentence on a
         repair, or an empty string.
     """
+    if _are_clock_times(texts):
+        # Hours of one digit become two.
+        dated = [f"1970-01-01 {'0' * (text.strip()[1:2] == ':')}{text.strip()}" for text in texts]
+        times, good, note = datetimes_to_ns(dated)
+        days = np.zeros(len(times), dtype=np.int64)
+        days[good] = np.concatenate(([0], np.cumsum(np.diff(times[good]) < -_HALF_DAY_NS)))
+        return times + 2 * _HALF_DAY_NS * days, good, note
     rows = len(texts)
     width = min(max((len(text) for text in texts), default=0), _LONGEST_DATE)
     if rows == 0 or width < 19:
@@ -383,6 +401,11 @@ def _float_or_nan(text: str) -> float:
 
 def _are_datetimes(values: Sequence[str]) -> bool:
     readable = sum(looks_like_datetime(value) for value in values)
+    return readable > 0 and readable >= _READABLE * len(values)
+
+
+def _are_clock_times(values: Sequence[str]) -> bool:
+    readable = sum(looks_like_clock_time(value) for value in values)
     return readable > 0 and readable >= _READABLE * len(values)
 
 

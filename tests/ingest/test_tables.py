@@ -301,6 +301,24 @@ def test_dates_in_whole_seconds_give_way_to_a_clock_that_is_finer(tmp_path: Path
         assert (plan.column, "repeat" in plan.note) == ("Date", False)
 
 
+def test_a_time_of_day_beside_a_date_that_is_not_read_goes_on_over_midnight(tmp_path: Path) -> None:
+    clock = ["23:59:58", "23:59:59.5", "0:00:01", "00:00:02.250"]
+    rows = [f"{'11/03/17' if k < 2 else '12/03/17'}\t{one}\t{k}" for k, one in enumerate(clock)]
+    path = tmp_path / "boat.txt"
+    path.write_text("\n".join(["Date\tTime\tBoatspeed", *rows]) + "\n", encoding="utf-8")
+    reader = open_log(path)
+    assert 'column "Time" (time of day, of which date is not known)' in reader.topics[0].note
+    series = reader.read({"table": ("Boatspeed",)})["table"]
+    assert (np.diff(series.receive_ns) / 1e9).tolist() == [1.5, 1.5, 1.25]
+    assert series.receive_ns[0] == (24 * 3600 - 2) * 10**9
+
+
+def test_a_time_of_day_that_cannot_be_read_is_no_time_of_its_row() -> None:
+    times, good, _ = datetimes_to_ns(["12:00:00", "12:00:01", "", "25:00:00", "12:00:04"])
+    assert good.tolist() == [True, True, False, False, True]
+    assert np.diff(times[good]).tolist() == [10**9, 3 * 10**9]
+
+
 def test_several_columns_that_may_be_the_time_are_listed() -> None:
     plan = guess_time({"u": ["1", "2"], "gps_week_time": ["1", "2"], "host_time": ["5", "6"]})
     assert plan is not None
