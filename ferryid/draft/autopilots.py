@@ -11,7 +11,7 @@ import numpy as np
 from ferryid.draft.actuator_fields import ActuatorField
 from ferryid.draft.autopilot_parameters import OutputSetting, Placement, UsedValues
 from ferryid.draft.control_allocation import rotor_placements, rudder_evidence, rudders_alone
-from ferryid.draft.fields import FieldGroup, rate_of
+from ferryid.draft.fields import FieldGroup, rate_of, span_of
 from ferryid.draft.samples import Samples
 from ferryid.draft.servo_functions import configured_outputs
 from ferryid.ingest.log import Topic
@@ -48,10 +48,42 @@ _VELOCITIES = {
 """Topics of PX4 whose definitions state the frame of their velocity; that of an odometry is in a field of its own."""
 
 
+_SPARES = {
+    ("XKF6", ""): "XKF1",
+    ("NKF6", ""): "NKF1",
+    ("AHR2", "heading"): "ATT",
+    ("AHR2", "position"): "POS",
+}
+"""Topic of a spare estimator, and of which kind of signal (empty: of any), with the topic that takes its place."""
+
+
 def with_frames(groups: Sequence[FieldGroup], topics: Sequence[Topic]) -> list[FieldGroup]:
-    """Return groups with the frame that the formats of the autopilots state: both keep poses in NED, velocities as named."""
+    """Return groups with the frame that the formats of the autopilots state: both keep poses in NED, velocities as named.
+
+    What a spare estimator of the autopilot has, it does not steer by: where the first one is in the log, it is left out.
+    """
     encodings = {topic.name: topic.encoding for topic in topics}
-    return [replace(one, frame=_stated_frame(one, encodings.get(one.topic, ""))) for one in groups]
+    names = {one.topic for one in groups}
+    names_of_autopilot = {name for name, encoding in encodings.items() if encoding in ("ulog", "dataflash")}
+    groups = [one for one in groups if not _is_spare(one, encodings.get(one.topic, ""), names)]
+    framed = [replace(one, frame=_stated_frame(one, encodings.get(one.topic, ""))) for one in groups]
+    if not any(one.kind == "velocity" and one.frame for one in framed):
+        return framed
+    # Beside a velocity whose definition is known, one of a controller may be in any unit and frame.
+    return [one for one in framed if one.kind != "velocity" or one.frame or one.topic not in names_of_autopilot]
+
+
+def _is_spare(group: FieldGroup, encoding: str, names: set[str]) -> bool:
+    """Whether a group is of another core of the same estimator, whose first is among the names of topics.
+
+    The second core was XKF6 or NKF6 until the cores of a message had numbers; AHR2 is the attitude by the older method.
+    """
+    if encoding not in ("ulog", "dataflash") or group.kind == "yaw_rate":
+        return False
+    bare = group.topic.strip("/")
+    numbered = re.fullmatch(r"((?:XKF|NKF)1|estimator_\w+)\[[1-9][0-9]*\]", bare)
+    first = numbered[1] if numbered else _SPARES.get((bare, group.kind), _SPARES.get((bare, ""), ""))
+    return bool(first) and group.topic.replace(bare, first) in names
 
 
 def _stated_frame(group: FieldGroup, encoding: str) -> str:
@@ -69,7 +101,7 @@ def autopilot_groups(topics: Sequence[Topic]) -> list[FieldGroup]:
     """Return attitude and yaw rate of PX4; nothing for a log of something else."""
     by_name = {topic.name.strip("/"): topic for topic in topics if topic.encoding == "ulog" and topic.count > 1}
     return [
-        FieldGroup(kind, topic.name, fields, form, rate_of(topic))
+        FieldGroup(kind, topic.name, fields, form, rate_of(topic), lasts_s=span_of(topic))
         for name, kind, fields, form in _ARRAYS
         for topic in [by_name.get(name)]
         if topic is not None and set(fields) <= topic.fields.keys()

@@ -147,7 +147,9 @@ class FieldGroup:
     rate_hz
         Messages per second, of the whole log.
     frame
-        The frame of a world that the log's format states, empty where it states none.
+        The frame that the log's format states, empty where it states none.
+    lasts_s
+        From the first message to the last [s].
     """
 
     kind: str
@@ -156,6 +158,7 @@ class FieldGroup:
     form: str = ""
     rate_hz: float = 0.0
     frame: str = ""
+    lasts_s: float = 0.0
 
     @property
     def label(self) -> str:
@@ -173,11 +176,17 @@ def numeric_fields(topic: Topic) -> dict[str, tuple[str, ...]]:
     return found
 
 
+def span_of(topic: Topic) -> float:
+    """Return the time from the first message of a topic to its last [s]; 0 where it is not known."""
+    if topic.start_ns is None or topic.end_ns is None:
+        return 0.0
+    return max(topic.end_ns - topic.start_ns, 0) * 1e-9
+
+
 def rate_of(topic: Topic) -> float:
     """Return messages per second of a topic; 0 where it has no length."""
-    if topic.start_ns is None or topic.end_ns is None or topic.end_ns <= topic.start_ns:
-        return 0.0
-    return (topic.count - 1) / ((topic.end_ns - topic.start_ns) * 1e-9)
+    span_s = span_of(topic)
+    return (topic.count - 1) / span_s if span_s > 0.0 else 0.0
 
 
 def navigation_groups(topics: Sequence[Topic]) -> list[FieldGroup]:
@@ -235,8 +244,10 @@ def _of_topic(topic: Topic, around: set[str], fields: Mapping[str, tuple[str, ..
     bare = {words[0]: path for path, words in fields.items() if len(words) == 1}
     if table and {"x", "y"} <= bare.keys() and not any(kind == "position" for kind, _, _ in found):
         found.append(("position", (bare["x"], bare["y"]), ""))
-    rate = rate_of(topic)
-    return [FieldGroup(kind, topic.name, paths, form, rate) for kind, paths, form in dict.fromkeys(found)]
+    rate, span_s = rate_of(topic), span_of(topic)
+    return [
+        FieldGroup(kind, topic.name, paths, form, rate, lasts_s=span_s) for kind, paths, form in dict.fromkeys(found)
+    ]
 
 
 def _vectors(

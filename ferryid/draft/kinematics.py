@@ -93,8 +93,13 @@ def _smoothed(samples: Samples, group: FieldGroup, place: int) -> Floats:
 
 
 def _of_kind(groups: Sequence[FieldGroup], kind: str) -> list[FieldGroup]:
-    """Return the groups of a kind but those that are much slower than the fastest."""
+    """Return the groups of a kind but those that are much slower than the fastest, or far shorter than the longest.
+
+    What a log states once, an origin or the corners of a fence, comes in a burst.
+    """
     some = [one for one in groups if one.kind == kind]
+    longest = max((one.lasts_s for one in some), default=0.0)
+    some = [one for one in some if one.lasts_s >= DRAFT.shorter * longest]
     fastest = max((one.rate_hz for one in some), default=0.0)
     return [one for one in some if one.rate_hz >= DRAFT.slower * fastest][: DRAFT.most_sources]
 

@@ -17,6 +17,12 @@ class DraftThresholds:
         "sources that are slower are left out",
         "convention: half, with room for lost messages",
     )
+    shorter: float = threshold(
+        0.1,
+        "of the longest time from first to last message",
+        "sources that are there for less are left out",
+        "convention: a tenth, far below a receiver that starts late",
+    )
     most_sources: int = threshold(
         6,
         "sources",

@@ -10,7 +10,11 @@ import numpy as np
 import pytest
 
 from ferryid.draft import Answers, Draft, draft_profile, draft_text, questions
+from ferryid.draft.autopilots import with_frames
+from ferryid.draft.fields import navigation_groups
 from ferryid.errors import FerryIdError
+from ferryid.ingest import open_log
+from ferryid.ingest.log import Topic
 from ferryid.signals.recording import record
 from ferryid.vessel import check_profile, load_profile, parse_profile
 from tests.draft.test_draft import Columns
@@ -262,6 +266,59 @@ def test_no_motion_overrules_the_frame_that_the_format_states(trial: Columns, tm
     draft = draft_profile(tmp_path / name)
     assert shown(draft)["velocity"][3] == "NED"
     assert any("do not agree in NED" in doubt for one in draft.signals for doubt in one.doubts)
+
+
+@pytest.mark.parametrize("second", ["XKF1", "XKF6"])
+def test_a_spare_estimator_is_no_second_velocity(trial: Columns, tmp_path: Path, second: str) -> None:
+    # Nothing knows a position, and the second core drifts another way.
+    log = DataFlash()
+    log.define("ATT", "QccC", "TimeUS,Roll,Pitch,Yaw")
+    log.define("XKF1", "QBCff", "TimeUS,C,Yaw,VN,VE")
+    log.define("XKF6", "QCff", "TimeUS,Yaw,VN,VE")
+    log.define("RCOU", "QHH", "TimeUS,C1,C3")
+    log.units("XKF1", "s#---")
+    drift = np.random.default_rng(3).normal(size=(2, len(trial["t"])))
+    rows: list[tuple[Any, ...]] = []
+    for k, t in enumerate((trial["t"] * 1e6).astype(int).tolist()):
+        yaw = int(np.degrees(trial["psi"][k]) % 360 * 100)
+        rows += [("ATT", t, 0, 0, yaw), ("XKF1", t, 0, yaw, float(trial["vn"][k]), float(trial["ve"][k]))]
+        spare = (yaw, float(drift[0, k]), float(drift[1, k]))
+        rows.append(("XKF1", t, 1, *spare) if second == "XKF1" else ("XKF6", t, *spare))
+        rows.append(("RCOU", t, int(1500 + 500 * trial["rudder"][k]), int(1500 + 0.3 * trial["n"][k])))
+    log.table(rows)
+    (tmp_path / "boat.bin").write_bytes(log.content)
+    assert shown(draft_profile(tmp_path / "boat.bin"))["velocity"] == ("/XKF1", ("VN", "VE"), "m/s", "NED")
+
+
+def test_what_a_log_states_in_a_burst_is_no_position(trial: Columns, tmp_path: Path) -> None:
+    log = DataFlash()
+    log.define("ORGN", "QBLLe", "TimeUS,Type,Lat,Lng,Alt")
+    log.define("POS", "QLL", "TimeUS,Lat,Lng")
+    log.define("ATT", "QC", "TimeUS,Yaw")
+    log.define("AHR2", "QCLL", "TimeUS,Yaw,Lat,Lng")
+    log.define("RCOU", "QHH", "TimeUS,C1,C3")
+    rows: list[tuple[Any, ...]] = [("ORGN", k, k, 634_000_000 + 1000 * k, 104_000_000, 0) for k in range(2)]
+    for k, t in enumerate((trial["t"] * 1e6).astype(int).tolist()):
+        place = (int(trial["lat"][k] * 1e7), int(trial["lon"][k] * 1e7))
+        yaw = int(np.degrees(trial["psi"][k]) % 360 * 100)
+        # The spare attitude is the better one here, but nothing steers by it.
+        rows += [("POS", t, *place), ("ATT", t, (yaw + 3000) % 36000), ("AHR2", t, yaw, *place)]
+        rows.append(("RCOU", t, int(1500 + 500 * trial["rudder"][k]), int(1500 + 0.3 * trial["n"][k])))
+    log.table(rows)
+    (tmp_path / "boat.bin").write_bytes(log.content)
+    found = shown(draft_profile(tmp_path / "boat.bin"))
+    assert (found["position"][0], found["heading"][0]) == ("/POS", "/ATT")
+
+
+def test_beside_a_velocity_of_known_definition_none_of_a_controller_is_taken(trial: Columns, tmp_path: Path) -> None:
+    content = ardupilot(drifting(trial) | {"lat": trial["lat"], "lon": trial["lon"]})
+    (tmp_path / "boat.bin").write_bytes(content)
+    topics = open_log(tmp_path / "boat.bin").topics
+    controller = Topic("/PSC", "PSC", "dataflash", 100, 0, 10**9, {"VX": "float", "VY": "float"})
+    groups = with_frames(navigation_groups([*topics, controller]), [*topics, controller])
+    assert {one.topic for one in groups if one.kind == "velocity"} == {"/XKF1"}
+    alone = with_frames(navigation_groups([controller]), [controller])
+    assert [one.topic for one in alone if one.kind == "velocity"] == ["/PSC"]
 
 
 def test_a_refusal_of_velocities_that_disagree_says_that_no_position_decides(trial: Columns, tmp_path: Path) -> None:
