@@ -280,10 +280,10 @@ def datetimes_to_ns(texts: Sequence[str]) -> tuple[Nanoseconds, NDArray[np.bool_
     if _are_clock_times(texts):
         # Hours of one digit become two.
         dated = [f"1970-01-01 {'0' * (text.strip()[1:2] == ':')}{text.strip()}" for text in texts]
-        times, good, note = datetimes_to_ns(dated)
+        times, readable, note = datetimes_to_ns(dated)
         days = np.zeros(len(times), dtype=np.int64)
-        days[good] = np.concatenate(([0], np.cumsum(np.diff(times[good]) < -_HALF_DAY_NS)))
-        return times + 2 * _HALF_DAY_NS * days, good, note
+        days[readable] = np.concatenate(([0], np.cumsum(np.diff(times[readable]) < -_HALF_DAY_NS)))
+        return times + 2 * _HALF_DAY_NS * days, readable, note
     rows = len(texts)
     width = min(max((len(text) for text in texts), default=0), _LONGEST_DATE)
     if rows == 0 or width < 19:
