@@ -25,11 +25,12 @@ _QUANTITIES = {
     "yaw_rate_radps": ("yaw rate", "deg/s", 180.0 / pi),
 }
 """Name, unit, and factor on SI."""
+_FORCE = "force"
 
 
 @dataclass(frozen=True)
 class ReplayRow:
-    """The errors of both versions: of what, its unit, and the ratio of new to old with its interval."""
+    """Root-mean-square errors of both versions: of what, its unit, and the ratio of new to old with its interval."""
 
     quantity: str
     unit: str
@@ -59,6 +60,16 @@ class Replay:
     rows: tuple[ReplayRow, ...]
     trained: tuple[str, ...]
     logs: tuple[Mapping[str, str], ...]
+
+    @property
+    def decides(self) -> bool:
+        """Whether there is any interval: fewer than eight blocks give none, and then nothing is better or worse."""
+        return any(isfinite(row.ratio.p) for row in self.rows)
+
+    @property
+    def free(self) -> bool:
+        """Whether the rows are of free runs."""
+        return not any(row.quantity.startswith(_FORCE) for row in self.rows)
 
     @property
     def worse(self) -> tuple[ReplayRow, ...]:
@@ -117,11 +128,16 @@ def _free_runs(scope: CommonErrors, pair: ModelPair) -> tuple[ReplayRow, ...]:
 def _forces(scope: CommonErrors, pair: ModelPair) -> tuple[ReplayRow, ...]:
     return tuple(
         ReplayRow(
-            f"force in {axis}",
+            f"{_FORCE} in {axis}",
             "N·m" if axis == "yaw" else "N",
             sqrt(scope.scores[pair.first].mse[axis]),
             sqrt(scope.scores[pair.second].mse[axis]),
-            pair.mse[axis],
+            _root(pair.mse[axis]),
         )
         for axis in AXES
     )
+
+
+def _root(ratio: Ratio) -> Ratio:
+    """Return the ratio of root-mean-square errors from that of the squares; p is of either."""
+    return Ratio(sqrt(ratio.value), sqrt(ratio.low), sqrt(ratio.high), ratio.p)

@@ -186,9 +186,14 @@ def as_text(result: FitOutcome, stored: StoredModel, report: Path | None) -> str
     lines.append(f"{'R², new':<28}" + "".join(f"{_number(value):>12}" for value in scores.r2_model.tolist()))
     lines.append("")
     for one in result.estimators:
+        folds = (
+            f"{_number(one.folds)} on folds of the training rows"
+            if np.isfinite(one.folds)
+            else "unknown on folds of the training rows, which are too short for it"
+        )
         lines.append(
-            f"estimator {one.name}: squared prediction error over the base model's {_number(one.folds)} on folds of the "
-            f"training rows, {_number(one.held_out)} held out{'; chosen' if one.chosen else ''}"
+            f"estimator {one.name}: squared prediction error over the base model's {folds}, {_number(one.held_out)} held out"
+            f"{'; chosen' if one.chosen else ''}"
         )
     lines.extend(f"wind, estimated: {one}" for one in result.winds)
     lines.extend([""] if result.estimators or result.winds else [])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -102,8 +103,8 @@ def _context(result: FitOutcome, interactive: Interactive) -> dict[str, Any]:
         "estimators": [
             {
                 "name": one.name + (", used" if one.chosen else ""),
-                "folds": f"{one.folds:.3f}",
-                "held_out": f"{one.held_out:.3f}",
+                "folds": f"{one.folds:.3f}" if isfinite(one.folds) else "unknown, too short for it",
+                "held_out": f"{one.held_out:.3f}" if isfinite(one.held_out) else "–",
             }
             for one in result.estimators
         ],

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
 from ferryid.compare import Replay, replay_versions
-from ferryid.counts import counted
+from ferryid.compare.comparison_result import Ratio
+from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError
 from ferryid.files import alone
 from ferryid.models import Model
@@ -56,6 +58,11 @@ def _verdict(new: Model, current: int | None, found: Replay | None) -> tuple[boo
             return True, "It was accepted, and no version was current."
         return True, "It was accepted; it was not compared with the version before on any log."
     where = counted(len(found.logs), "log")
+    if not found.decides:
+        short = f"{where} {verb(len(found.logs), 'is')} too short to distinguish it from @{current}"
+        if not new.accepted:
+            return False, f"It was rejected by its fit, and {short}."
+        return True, f"It was accepted, and {short}."
     if found.worse:
         return False, f"Replayed on {where} it is worse than @{current} in {_named(found.worse)}."
     if not new.accepted and not found.better:
@@ -65,6 +72,12 @@ def _verdict(new: Model, current: int | None, found: Replay | None) -> tuple[boo
         )
     better = f"better than @{current} in {_named(found.better)}" if found.better else f"not worse than @{current}"
     return True, f"Replayed on {where} it is {better}."
+
+
+def _with_interval(ratio: Ratio) -> str:
+    if not isfinite(ratio.p):
+        return f"{ratio.value:.2f} (too little data for one)"
+    return f"{ratio.value:.2f} ({ratio.low:.2f} to {ratio.high:.2f})"
 
 
 def _named(rows: Sequence[Any]) -> str:
@@ -78,10 +91,10 @@ def _told(
     if not promoted:
         lines.append("Fix: replay it on logs that neither was trained on, or use --force, which the history mentions")
     if found is not None:
-        lines += ["", f"{'rms error of free runs':<28}{f'@{new.version}':>10}{f'@{before}':>10}  ratio (95 % interval)"]
+        title = "rms error of free runs" if found.free else "rms error, no free runs"
+        lines += ["", f"{title:<28}{f'@{new.version}':>10}{f'@{before}':>10}  ratio (95 % interval)"]
         lines += [
-            f"{f'{row.quantity} [{row.unit}]':<28}{row.new:>10.3g}{row.old:>10.3g}  {row.ratio.value:.2f} ({row.ratio.low:.2f} "
-            f"to {row.ratio.high:.2f})"
+            f"{f'{row.quantity} [{row.unit}]':<28}{row.new:>10.3g}{row.old:>10.3g}  {_with_interval(row.ratio)}"
             for row in found.rows
         ]
         lines += [f"warning: {label} was trained on such a log: it is no evidence for it" for label in found.trained]

@@ -15,7 +15,7 @@ from ferryid.signals.data_quality import left_out_sentences
 from ferryid.signals.faults import Faults
 from ferryid.signals.quality import POSE
 from ferryid.signals.recording import Recording, data_quality, record
-from ferryid.signals.sampling import check_sampling
+from ferryid.signals.sampling import check_grid, check_sampling
 from ferryid.signals.smooth import Measured, measure, smooth_measured
 from ferryid.signals.thresholds import SIGNALS
 from ferryid.signals.track import Motion, Track
@@ -110,6 +110,8 @@ def track_of(
 ) -> Opened:
     """Align a recording and reconstruct its forces; arguments and errors are those of `prepare` and `align`."""
     check_sampling(recording, profile)
+    if rate_hz is not None:
+        check_grid(profile, rate_hz)
     track = align(recording, profile, rate_hz, faults)
     for doubt in track.doubts:
         if doubt.certain:

@@ -37,11 +37,27 @@ def check_sampling(recording: Recording, profile: Profile) -> None:
     length_m = _length(profile)
     if period_s <= SIGNALS.slowest_period * sqrt(length_m / GRAVITY):
         return
-    least_hz = 1.0 / (SIGNALS.slowest_period * sqrt(length_m / GRAVITY))
     raise FerryIdError(
         f"{_file(recording)}: the motion is sampled too slowly for a fit, found a row of {lead.topic} every "
-        f"{period_s:.4g} s, where a vessel of {length_m:.3g} m needs at least {least_hz:.2g} Hz. "
+        f"{period_s:.4g} s, where a vessel of {length_m:.3g} m needs at least {_least_hz(length_m):.2g} Hz. "
         f"Fix: {_remedy(recording, lead, period_s)}"
+    )
+
+
+def check_grid(profile: Profile, rate_hz: float) -> None:
+    """Refuse a grid of `rate_hz` [Hz] that samples the motion of the vessel too slowly, as `check_sampling` does a log.
+
+    Raises
+    ------
+    FerryIdError
+        Where rows are further apart than 2 sqrt(L/g).
+    """
+    length_m = _length(profile)
+    if 1.0 / rate_hz <= SIGNALS.slowest_period * sqrt(length_m / GRAVITY):
+        return
+    raise FerryIdError(
+        f"--rate: {rate_hz:g} Hz is too slow for a fit, a vessel of {length_m:.3g} m needs at least "
+        f"{_least_hz(length_m):.2g} Hz. Fix: give a higher rate, or leave it out for that of the navigation"
     )
 
 
@@ -97,6 +113,10 @@ def _standing(recording: Recording, streams: Sequence[Stream]) -> str:
         else "record the log again with a running clock"
     )
     return f"{file}: time does not advance, found {found} with the same time. Fix: {remedy}"
+
+
+def _least_hz(length_m: float) -> float:
+    return 1.0 / (SIGNALS.slowest_period * sqrt(length_m / GRAVITY))
 
 
 def _length(profile: Profile) -> float:

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import json
 import shutil
+from math import nan
 from pathlib import Path
 
 import pytest
 
-from ferryid.compare import Replay
+from ferryid.compare import Replay, replay_versions
 from ferryid.compare.comparison_result import Ratio
 from ferryid.compare.replay import ReplayRow
 from ferryid.models.store import load
 from ferryid.report import promotion
+from ferryid.signals.time_ranges import parse_ranges
+from ferryid.types import RunContext
 from tests.cli.test_every_command import SCALE, THESIS, conforms
 from tests.command_line.in_process import invoke
 
@@ -72,6 +75,39 @@ def test_a_version_that_is_worse_is_promoted_by_force_alone(
     assert (run.code, current(store)) == (0, "2")
     last = json.loads((store / "models" / "milliampere" / "history.jsonl").read_text().splitlines()[-1])
     assert (last["forced"], last["logs"]) == (True, [{"name": "a", "sha256": "b"}])
+
+
+@pytest.mark.parametrize(
+    ("version", "code", "told"),
+    [
+        ("1", 0, "It was accepted, and 1 log is too short to distinguish it from @2."),
+        ("3", 3, "It was rejected by its fit, and 1 log is too short to distinguish it from @2."),
+    ],
+)
+def test_a_replay_without_intervals_speaks_for_none(
+    ferryid, fixtures: Path, store: Path, monkeypatch: pytest.MonkeyPatch, version: str, code: int, told: str
+) -> None:
+    models = store / "models" / "milliampere"
+    rejected = json.loads((models / "1.json").read_text()) | {"version": 3, "accepted": False}
+    (models / "3.json").write_text(json.dumps(rejected))
+    row = ReplayRow("force in surge", "N", 1.0, 2.0, Ratio(0.5, nan, nan, nan))
+    monkeypatch.setattr(promotion, "replay_versions", lambda *_: Replay((row,), (), ({"name": "a", "sha256": "b"},)))
+    run = ferryid("models", "promote", f"milliampere@{version}", fixtures / "short.bag", "--out", store)
+    assert (run.code, told in run.out) == (code, True), run.out
+    assert "free runs  " not in run.out.replace("no free runs", "")
+    assert "0.50 (too little data for one)" in run.out
+    assert "nan" not in run.out
+
+
+def test_a_ratio_of_forces_is_that_of_the_errors_beside_it(fitted: Path, fixtures: Path, tmp_path: Path) -> None:
+    store = shutil.copytree(fitted, tmp_path / "store")
+    new, old = load("milliampere@1", store), load("milliampere@2", store)
+    context = RunContext(out=store, ranges=parse_ranges("0", "20"))
+    rows = replay_versions(new, old, [str(fixtures / "short.bag")], context).rows
+    forces = [row for row in rows if row.quantity.startswith("force in")]
+    assert len(forces) == len(rows) == 3
+    for row in forces:
+        assert row.ratio.value == pytest.approx(row.new / row.old, rel=1e-9)
 
 
 def test_a_rejected_version_needs_a_log_that_speaks_for_it(ferryid, fixtures: Path, store: Path) -> None:

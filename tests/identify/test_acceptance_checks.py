@@ -37,9 +37,17 @@ def test_an_inertia_is_possible_between_its_bounds() -> None:
     assert not failed(inertia_checks(PROFILE, 1.5 * RIGID))
     assert failed(inertia_checks(PROFILE, RIGID @ np.diag([0.5, 1.5, 1.5]))) >= {"inertia_surge"}
     assert failed(inertia_checks(PROFILE, np.diag([1.5, 6.0, 1.5]) @ np.diag(np.diag(RIGID)))) == {"inertia_sway"}
-    at_bound = inertia_checks(PROFILE, np.diag([5.0, 1.5, 1.5]) @ np.diag(np.diag(RIGID)))
+    at_bound = inertia_checks(PROFILE, np.diag([0.8, 1.5, 1.5]) @ np.diag(np.diag(RIGID)))
     assert not failed(at_bound)
     assert "held at that bound" in next(check.reason for check in at_bound if check.name == "inertia_surge")
+
+
+def test_an_inertia_held_at_its_upper_bound_is_none_that_a_hull_has() -> None:
+    at_bound = inertia_checks(PROFILE, np.diag([5.0, 1.5, 1.5]) @ np.diag(np.diag(RIGID)))
+    assert failed(at_bound) == {"inertia_surge"}
+    reason = next(check.reason for check in at_bound if check.name == "inertia_surge")
+    assert "held at that bound" in reason
+    assert "the applied force may be too large, or the actuators were not engaged. Fix: in the profile" in reason
 
 
 def test_a_mass_matrix_has_to_be_positive_definite_however_large_its_diagonal() -> None:

@@ -71,7 +71,7 @@ def test_fits_promotions_and_rollbacks_of_a_store(tmp_path: Path) -> None:
         roll_back("boat", tmp_path)
     promote(second, tmp_path, "Better.")
     assert roll_back("boat", tmp_path, 1) == (2, first.version)
-    with pytest.raises(FerryIdError, match=r"boat@3: not current before, those that were: .* Fix: "):
+    with pytest.raises(FerryIdError, match=r"boat@3: not among the versions that a rollback can return to: .* Fix: "):
         roll_back("boat", tmp_path, 3)
     listed = list_versions(tmp_path)
     assert [change["action"] for change in listed["history"]["boat"]] == [

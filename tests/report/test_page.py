@@ -6,13 +6,16 @@ import html
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
+from math import inf
 from pathlib import Path
 
 import pytest
 
-from ferryid.identify.outcome import FitOutcome
+from ferryid.identify.outcome import EstimatorScore, FitOutcome
 from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.settings import FitSettings
+from ferryid.models.store.versions import StoredModel
+from ferryid.report.fit_report import as_text
 from ferryid.report.headline import headline_of
 from ferryid.report.page import render
 from ferryid.types import RunContext
@@ -75,6 +78,18 @@ def test_verdict_comes_before_any_figure(result: FitOutcome, rendered: tuple[str
 def test_a_model_that_is_not_accepted_is_told_so(result: FitOutcome) -> None:
     rejected = replace(result, acceptance=replace(result.acceptance, accepted=False))
     assert "Not accepted" in render(rejected)[0]
+
+
+def test_an_estimator_without_a_model_on_the_folds_is_said_to_be_without_one(
+    result: FitOutcome, tmp_path: Path
+) -> None:
+    scores = (EstimatorScore("weak", inf, 0.11, False), EstimatorScore("derivative", 0.063, 0.212, True))
+    compared = replace(result, estimators=scores)
+    page = render(compared)[0]
+    assert "<td>weak</td><td>unknown, too short for it</td><td>0.110</td>" in page
+    told = as_text(compared, StoredModel(tmp_path / "1.json", compared.model, current=False), None)
+    assert "model's unknown on folds of the training rows, which are too short for it, 0.110 held out\n" in told
+    assert "model's 0.063 on folds of the training rows, 0.212 held out; chosen" in told
 
 
 def test_names_of_logs_and_warnings_are_escaped(result: FitOutcome) -> None:

@@ -126,6 +126,15 @@ def test_a_log_of_one_sample_per_second_is_taken(tmp_path: Path, boat: Profile) 
     assert inspect(table(tmp_path, [str(n) for n in range(300)]), boat)["vessel"]["usable"]
 
 
+def test_a_grid_that_is_too_slow_for_the_vessel_is_refused_as_such_a_log_is(tmp_path: Path, boat: Profile) -> None:
+    path = table(tmp_path, [f"{0.1 * n:.1f}" for n in range(300)])
+    with pytest.raises(
+        FerryIdError, match=r"--rate: 0\.5 Hz is too slow for a fit, a vessel of .* at least 0\.7 Hz\. Fix"
+    ):
+        prepare(path, boat, tmp_path / "out", window_s=1.0, rate_hz=0.5)
+    assert prepare(path, boat, tmp_path / "out", window_s=1.0, rate_hz=1.0).motion.rate_hz == 1.0
+
+
 def test_the_spectrum_of_a_slow_log_is_no_crash() -> None:
     n = 200
     motion = SimpleNamespace(

@@ -135,7 +135,7 @@ def roll_back(name: str, out: Path, to: int | None = None) -> tuple[int | None, 
     if target not in earlier:
         listed = ", ".join(str(version) for version in sorted(set(earlier))) or "none"
         raise FerryIdError(
-            f"{name}@{target}: not current before, those that were: {listed}. Fix: choose one of them, or use "
+            f"{name}@{target}: not among the versions that a rollback can return to: {listed}. Fix: choose one of them, or use "
             f"ferryid models promote {name}@{target}"
         )
     load_file(folder / f"{target}.json")
