@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -120,8 +121,9 @@ def _labels(references: Sequence[str], models: Sequence[Model]) -> list[str]:
     ]
 
 
-def _content(model: Model) -> dict[str, object]:
-    return model_to_json(replace(model, name="", version=0, created=""))
+def _content(model: Model) -> str:
+    """Return what a model holds beside its name, as text: of two that lack the same value, NaN, each says so alike."""
+    return json.dumps(model_to_json(replace(model, name="", version=0, created="")), sort_keys=True)
 
 
 def _check_shared(labels: Sequence[str], profiles: Sequence[Profile]) -> None:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from ferryid.compare.candidates import BASE, select_candidates
 from ferryid.errors import FerryIdError
 from ferryid.models.model import Model
+from ferryid.models.scores import ForceScores, ModelScores
 from ferryid.vessel import load_profile
 from tests.export.models import fitted
 
@@ -49,6 +51,16 @@ def test_what_means_nothing_is_refused(models: list[Model], told: str) -> None:
         select_candidates([str(k) for k in range(len(models))], models)
     assert told in str(refused.value)
     assert "Fix: " in str(refused.value)
+
+
+def test_a_model_without_a_score_is_the_same_as_itself() -> None:
+    # Each reading of the file gives a NaN of its own, and none equals another.
+    without_sway = np.array([1.0, 0.0, 1.0])
+    scores = [ModelScores(ForceScores.of(np.ones(3), np.ones(3), without_sway), 9, 9.0, "blocks", ()) for _ in range(2)]
+    assert np.isnan(scores[0].force.r2_model[1])
+    twice = [replace(ONE, scores=each) for each in scores]
+    with pytest.raises(FerryIdError, match="0 and 1: the same model"):
+        select_candidates(["0", "1"], twice)
 
 
 def test_a_profile_that_is_given_measures_the_force_and_its_difference_is_told() -> None:
