@@ -11,6 +11,7 @@ from ferryid.compare.comparison_result import (
     EffectRow,
     LogErrors,
     ModelPair,
+    Ratio,
     Statement,
 )
 from ferryid.compare.evaluation import evaluate
@@ -29,6 +30,7 @@ __all__ = [
     "EffectRow",
     "LogErrors",
     "ModelPair",
+    "Ratio",
     "Replay",
     "Statement",
     "Tracking",

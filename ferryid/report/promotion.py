@@ -7,8 +7,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from ferryid.compare import Replay, replay_versions
-from ferryid.compare.comparison_result import Ratio
+from ferryid.compare import Ratio, Replay, replay_versions
 from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError
 from ferryid.files import alone
