@@ -12,8 +12,7 @@ if not TYPE_CHECKING:
 
     def __getattr__(name: str) -> object:
         """Say where the calls of the Python API are: subpackages have the names of some, so that they cannot be here."""
-        from importlib import import_module
-
-        calls = import_module("ferryid.api").__all__ if name != "api" else ()
-        where = f": it is ferryid.api.{name} (from ferryid import api)" if name in calls else ""
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}{where}")
+        raise AttributeError(
+            f"module {__name__!r} has no attribute {name!r}: the calls of the Python API are in ferryid.api "
+            "(from ferryid import api)"
+        )

@@ -51,12 +51,8 @@ def test_importing_it_imports_nothing_heavy() -> None:
 
 
 def test_who_looks_for_a_call_in_the_package_is_told_where_it_is() -> None:
-    with pytest.raises(
-        AttributeError, match=r"no attribute 'fit': it is ferryid\.api\.fit \(from ferryid import api\)"
-    ):
+    with pytest.raises(AttributeError, match=r"no attribute 'fit': .* are in ferryid\.api \(from ferryid import api\)"):
         ferryid.fit  # noqa: B018
-    with pytest.raises(AttributeError, match=r"no attribute 'fitt'$"):
-        ferryid.fitt  # noqa: B018
     assert not hasattr(ferryid, "sweep")
 
 
