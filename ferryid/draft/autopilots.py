@@ -94,7 +94,7 @@ def _stated_frame(group: FieldGroup, encoding: str) -> str:
         return "NED"
     if encoding == "ulog":
         return _VELOCITIES.get(re.sub(r"\[[0-9]+\]$", "", group.topic.strip("/")), "")
-    return "NED" if group.fields == ("VN", "VE") else ""
+    return group.named_frame
 
 
 def autopilot_groups(topics: Sequence[Topic]) -> list[FieldGroup]:

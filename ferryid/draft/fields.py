@@ -161,6 +161,12 @@ class FieldGroup:
     lasts_s: float = 0.0
 
     @property
+    def named_frame(self) -> str:
+        """The frame of a world that the names of a velocity's components state, or an empty string."""
+        last = tuple(words_of(path)[-1] for path in self.fields)
+        return "NED" if last in (("vn", "ve"), ("vnorth", "veast")) else ""
+
+    @property
     def label(self) -> str:
         """Topic and fields."""
         return f"{self.topic}: {', '.join(self.fields)}"

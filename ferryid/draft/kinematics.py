@@ -172,12 +172,6 @@ def _named_frame(pose: _Pose) -> str:
     return ""
 
 
-def _named_velocity_frame(velocity: FieldGroup) -> str:
-    """Return the frame of a world that the names of a velocity's components state, or an empty string."""
-    first, second = (words_of(path)[-1] for path in velocity.fields)
-    return "NED" if (first, second) in (("vn", "ve"), ("vnorth", "veast")) else ""
-
-
 def _poses(position: FieldGroup | None, heading: FieldGroup, samples: Samples) -> list[_Pose]:
     """Return a position and a heading in every frame that they may be in."""
     unit = "quaternion" if heading.form else _angle_unit(heading, samples)
@@ -229,7 +223,7 @@ def _agreement(pose: _Pose, velocity: FieldGroup | None, samples: Samples) -> _A
         return _Agreement(_along(pose), "", 1.0, 0.0, None, pose)
     first, second = (_smoothed(samples, velocity, place) for place in (0, 1))
     ahead, aside = to_body(pose.north, pose.east, pose.psi)
-    named = velocity.frame or _named_velocity_frame(velocity)
+    named = velocity.frame or velocity.named_frame
     if pose.position is None:
         return _Agreement(0.0, named or "FRD", 1.0, 0.0, velocity, pose)
     seen = {}
@@ -411,12 +405,11 @@ def _velocity(velocity: FieldGroup, chosen: _Agreement, others: Sequence[str]) -
         doubts.append(f"pose and velocity do not agree {frames}: another topic may be right, or the log is too short")
     if chosen.pose.position is None:
         evidence = "no position to compare it with"
-        named = _named_velocity_frame(velocity)
         if velocity.frame:
             evidence += f"; {velocity.frame} as its format states"
-        elif named:
-            evidence += f"; {named} by the names of its components"
-        doubts.append("its unit is assumed" if velocity.frame or named else "unit and frame are assumed")
+        elif velocity.named_frame:
+            evidence += f"; {velocity.named_frame} by the names of its components"
+        doubts.append("its unit is assumed" if velocity.frame or velocity.named_frame else "unit and frame are assumed")
     elif abs(log(max(left, 1e-3))) > DRAFT.gain:
         doubts.append(f"it is {left:.2f} times the position's slope, which no unit explains")
     if chosen.frame in _BODY and abs(chosen.sway) < DRAFT.seen:

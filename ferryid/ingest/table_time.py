@@ -19,6 +19,7 @@ _PREFIX = {3: "milli", 6: "micro", 9: "nano"}
 UNIT_NS = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1_000, "ns": 1}
 _DATETIME = re.compile(r"\s*\d{4}[-/.]\d{2}[-/.]\d{2}[ T]\d{2}:\d{2}:\d{2}([.,]\d*)?\s*(Z|[+-]\d{2}:?\d{2})?\s*$")
 _CLOCK = re.compile(r"\s*\d{1,2}:\d{2}:\d{2}([.,]\d*)?\s*$")
+_CLOCK_ROWS = 1000
 _HALF_DAY_NS = 43_200 * 1_000_000_000
 _TIME_NAME = re.compile(
     r"%?(rosbag|log|gps|unix|epoch|utc|receive|recv|elapsed|rec)?[ _.]*"
@@ -277,7 +278,8 @@ def datetimes_to_ns(texts: Sequence[str]) -> tuple[Nanoseconds, NDArray[np.bool_
         Times [ns], shape (n,), 0 where unreadable; a mask, True where readable; a sentence on a
         repair, or an empty string.
     """
-    if _are_clock_times(texts):
+    # Some of the rows show it: a pattern matched on every row of a long table takes seconds.
+    if _are_clock_times(texts[:: 1 + len(texts) // _CLOCK_ROWS]):
         # Hours of one digit become two.
         dated = [f"1970-01-01 {'0' * (text.strip()[1:2] == ':')}{text.strip()}" for text in texts]
         times, readable, note = datetimes_to_ns(dated)
