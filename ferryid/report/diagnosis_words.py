@@ -61,7 +61,7 @@ def headline(diagnosis: Diagnosis) -> str:
     every = [one for one in diagnosis.findings if one.effect != UNKNOWN]
     named = [one for one in every if one.sure]
     doubtful = listed([_inline(title(one.effect, one.instance)) for one in every if one not in named])
-    physics = [_inline(title(one.effect, one.instance)) for one in named if one.effect in effects()]
+    physics = [_sure_name(one) for one in named if one.effect in effects()]
     sensors = [_inline(title(one.effect)) for one in named if one.effect not in effects()]
     base = "simulation" if diagnosis.against else "model"
     left_out = "the recording differs from the simulation in" if diagnosis.against else "the model left out"
@@ -250,6 +250,12 @@ def rivals(finding: Finding) -> list[str]:
     return lines
 
 
+def _sure_name(finding: Finding) -> str:
+    """Return what a sure finding is called within a sentence, with all that cannot be distinguished from it."""
+    others = [_inline(one) for name in finding.unresolved_with for one in _meant(finding, name)]
+    return listed([_inline(title(finding.effect, finding.instance)), *others], "or")
+
+
 def _meant(finding: Finding, name: str) -> list[str]:
     """Return what an effect that is not told apart is called: of the finding's own it is that of another thruster."""
     if name != finding.effect:
@@ -293,9 +299,10 @@ def summary(diagnoses: Sequence[Diagnosis]) -> str:
     ]
     every = [finding for one in diagnoses for finding in one.findings]
     named = [one for one in every if one.effect != UNKNOWN]
-    sure = list(dict.fromkeys(_inline(title(one.effect, one.instance)) for one in named if one.sure))
+    sure = list(dict.fromkeys(_sure_name(one) for one in named if one.sure))
     doubtful = dict.fromkeys(_inline(title(one.effect, one.instance)) for one in named if not one.sure)
-    perhaps = [one for one in doubtful if one not in sure]
+    known = {_inline(title(one.effect, one.instance)) for one in named if one.sure}
+    perhaps = [one for one in doubtful if one not in known]
     parts = [f"Of {counted(len(diagnoses), 'log')}, {listed(counts)}."]
     if sure:
         parts.append(f"The model left out {listed(sure)}.")

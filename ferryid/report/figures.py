@@ -41,6 +41,8 @@ STYLE: dict[Any, Any] = {
     "axes.spines.right": False,
     "axes.grid": True,
     "axes.axisbelow": True,
+    # Beyond, one power of ten for all ticks: longer numbers reach into the label of the axis.
+    "axes.formatter.limits": (-4, 5),
     "grid.color": "#e4e4e4",
     "grid.linewidth": 0.6,
     "lines.linewidth": 1.1,

@@ -192,7 +192,7 @@ def as_text(result: FitOutcome, stored: StoredModel, report: Path | None) -> str
             else "unknown on folds of the training rows, which are too short for it"
         )
         lines.append(
-            f"estimator {one.name}: squared prediction error over the base model's {folds}, {_number(one.held_out)} held out"
+            f"estimator {one.name}: squared prediction error over the base model's: {folds}, {_number(one.held_out)} held out"
             f"{'; chosen' if one.chosen else ''}"
         )
     lines.extend(f"wind, estimated: {one}" for one in result.winds)

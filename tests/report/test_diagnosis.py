@@ -228,7 +228,7 @@ def test_the_letter_has_its_order() -> None:
     places = [
         page.index(text)
         for text in (
-            "Explained: the model left out steady wind and thruster force (thruster1)",
+            "Explained: the model left out steady wind or current and thruster force (thruster1)",
             wind().says,
             "North -3.02 m/s",
             "<svg",
@@ -244,8 +244,8 @@ def test_the_letter_has_its_order() -> None:
 
 def test_a_verdict_is_told_with_what_changed() -> None:
     assert headline(diagnosis("explained")) == (
-        "Explained: the model left out steady wind and thruster force (thruster1); with them, the squared force error on "
-        "held-out data falls by 75 % in surge, 90 % in sway and 95 % in yaw."
+        "Explained: the model left out steady wind or current and thruster force (thruster1); with them, the squared force "
+        "error on held-out data falls by 75 % in surge, 90 % in sway and 95 % in yaw."
     )
     assert headline(diagnosis("matched")).startswith("Matched: nothing")
 
@@ -331,7 +331,7 @@ def nameless() -> Finding:
 @pytest.mark.blank
 def test_what_has_no_name_is_no_fault_of_the_sensors() -> None:
     one = replace(diagnosis("partly_explained"), findings=(wind(), nameless()))
-    assert headline(one).startswith("Partly explained: the model left out steady wind; with it,")
+    assert headline(one).startswith("Partly explained: the model left out steady wind or current; with it,")
     assert "sensors" not in headline(one)
     page, drawings = render((one,), "trial")
     assert "2. Something without a name" in page
@@ -440,7 +440,8 @@ def test_errors_that_no_finding_changes_are_told_once() -> None:
     (row,) = force_rows(alone)
     assert about_errors(alone) == ["Not subtracted from these errors: unexplained forces."]
     assert row["name"] == "root-mean-square error"
-    waves = replace(alone, findings=(replace(nameless(), effect="waves"),), verdict="explained")
+    waves = replace(nameless(), effect="waves", unresolved_with=())
+    waves = replace(alone, findings=(waves,), verdict="explained")
     assert headline(waves) == "Explained: the model left out waves."
 
 

@@ -88,8 +88,8 @@ def test_an_estimator_without_a_model_on_the_folds_is_said_to_be_without_one(
     page = render(compared)[0]
     assert "<td>weak</td><td>unknown, too short for it</td><td>0.110</td>" in page
     told = as_text(compared, StoredModel(tmp_path / "1.json", compared.model, current=False), None)
-    assert "model's unknown on folds of the training rows, which are too short for it, 0.110 held out\n" in told
-    assert "model's 0.063 on folds of the training rows, 0.212 held out; chosen" in told
+    assert "model's: unknown on folds of the training rows, which are too short for it, 0.110 held out\n" in told
+    assert "model's: 0.063 on folds of the training rows, 0.212 held out; chosen" in told
 
 
 def test_names_of_logs_and_warnings_are_escaped(result: FitOutcome) -> None:
