@@ -252,8 +252,15 @@ def rivals(finding: Finding) -> list[str]:
 
 def _sure_name(finding: Finding) -> str:
     """Return what a sure finding is called within a sentence, with all that cannot be distinguished from it."""
-    others = [_inline(one) for name in finding.unresolved_with for one in _meant(finding, name)]
-    return listed([_inline(title(finding.effect, finding.instance)), *others], "or")
+    return listed([_inline(one) for one in _called(finding)], "or")
+
+
+def _called(finding: Finding) -> list[str]:
+    """Return the titles of a finding's effect and of all that cannot be distinguished from it."""
+    return [
+        title(finding.effect, finding.instance),
+        *(one for name in finding.unresolved_with for one in _meant(finding, name)),
+    ]
 
 
 def _meant(finding: Finding, name: str) -> list[str]:
@@ -301,7 +308,7 @@ def summary(diagnoses: Sequence[Diagnosis]) -> str:
     named = [one for one in every if one.effect != UNKNOWN]
     sure = list(dict.fromkeys(_sure_name(one) for one in named if one.sure))
     doubtful = dict.fromkeys(_inline(title(one.effect, one.instance)) for one in named if not one.sure)
-    known = {_inline(title(one.effect, one.instance)) for one in named if one.sure}
+    known = {_inline(name) for one in named if one.sure for name in _called(one)}
     perhaps = [one for one in doubtful if one not in known]
     parts = [f"Of {counted(len(diagnoses), 'log')}, {listed(counts)}."]
     if sure:

@@ -182,8 +182,8 @@ def test_the_axis_that_gets_worse_is_named() -> None:
         remainder=remainder,
     )  # fmt: skip
     assert headline(one) == (
-        "Partly explained: the model left out steady wind; with it, the squared force error on held-out data falls by 27 % in "
-        "surge and rises by 333 % in sway. In sway the findings make the force error larger."
+        "Partly explained: the model left out steady wind or current; with it, the squared force error on held-out data falls "
+        "by 27 % in surge and rises by 333 % in sway. In sway the findings make the force error larger."
     )
 
 
@@ -199,10 +199,10 @@ def test_a_repeated_sample_explains_no_forces_that_were_not_testable() -> None:
 def test_hints_of_several_logs_are_told_as_hints() -> None:
     logs = [
         Diagnosis(name, "ferry", verdict_of(findings, Remainder()), findings, {}, {})
-        for name, findings in (("a", (SURE,)), ("b", (HINT, NAMELESS)))
+        for name, findings in (("a", (SURE,)), ("b", (HINT, replace(HINT, effect="waves"), NAMELESS)))
     ]
     assert summary(logs) == (
-        "Of 2 logs, 1 explained and 1 unexplained. The model left out steady wind. Perhaps it also left out current. "
+        "Of 2 logs, 1 explained and 1 unexplained. The model left out steady wind or current. Perhaps it also left out waves. "
         "More is missing, which nothing known here explains."
     )
 
