@@ -208,6 +208,8 @@ class TransferScore(Record):
         Of a rival: the physics that it names.
     effects
         Of the diagnosed model: the effects that act.
+    windows
+        As `mse`, of force errors averaged over windows, in which noise does not drown them; empty in lines of before.
     """
 
     mse: Mapping[str, float | None]
@@ -220,6 +222,7 @@ class TransferScore(Record):
     why: str = ""
     names: tuple[RivalName, ...] | None = None
     effects: tuple[StoredEffectNote, ...] | None = None
+    windows: Mapping[str, float | None] = field(default_factory=dict)
 
     @property
     def complete(self) -> bool:

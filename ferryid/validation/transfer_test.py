@@ -14,12 +14,15 @@ from ferryid.errors import FerryIdError
 from ferryid.models import Conditions, Model, StoredEffect, force_scores, usable_rows
 from ferryid.models.prediction import FreeRun, Prediction, predict
 from ferryid.models.store import load_file
+from ferryid.regression import window_weights
 from ferryid.signals.prepare import Prepared
+from ferryid.signals.track import segments
 from ferryid.types import AXES, Floats
 from ferryid.validation.records import DIAGNOSED, StoredEffectNote, TransferResult, TransferScore
 from ferryid.validation.rivals import RIVALS, Learner
 from ferryid.validation.rivals.base import base_of, prepared_log
 from ferryid.validation.rivals.learner import SMOOTHER, WINDOW_S
+from ferryid.vessel.dimensions import window_seconds
 from ferryid.vessel.profile import Profile
 
 HORIZON_S = 60.0
@@ -91,10 +94,49 @@ def transfer_test(
     # On the same rows for all, so that nobody gains by what it cannot predict.
     rows = usable_rows(motion, base.tau, *(each.tau for each in found.values()))
     base_run = base.free_run(rows)
+    length_s = window_seconds(profile)
+
+    def in_windows(prediction: Prediction) -> Floats:
+        return window_errors(motion.tau - prediction.tau, rows, motion.rate_hz, length_s)
+
+    base_windows = _power(in_windows(base))
+    scores = {name: _score(motion.tau, base.tau, found.get(name), rows, base_run, more) for name, more in known.items()}
     return TransferResult(
-        _base_score(motion.tau, base, rows, base_run),
-        {name: _score(motion.tau, base.tau, found.get(name), rows, base_run, more) for name, more in known.items()},
+        replace(_base_score(motion.tau, base, rows, base_run), windows=_by_axis(base_windows)),
+        {
+            name: replace(one, windows=_by_axis(_power(in_windows(found[name])) / base_windows))
+            if name in found
+            else one
+            for name, one in scores.items()
+        },
     )
+
+
+def window_errors(errors: Floats, rows: Rows, rate_hz: float, length_s: float) -> Floats:
+    """Return force errors averaged over windows as the weak form averages forces, so that noise does not drown them.
+
+    An average of a differentiated velocity, weighted with a test function, is one of the velocity with its slope.
+
+    Parameters
+    ----------
+    errors
+        In every row [N, N, N·m], shape (n, 3).
+    rows
+        Rows to use, shape (n,); every window lies wholly within an unbroken stretch of them. They overlap by half.
+    rate_hz
+        Rows per second.
+    length_s
+        Length of a window [s].
+
+    Returns
+    -------
+    ndarray
+        Shape (J, 3).
+    """
+    m = max(4, round(length_s * rate_hz))
+    weight = window_weights(m, 1.0 / rate_hz)[0] / rate_hz
+    starts = [begin for one in segments(rows) for begin in range(one.start, one.stop - m + 1, max(1, m // 2))]
+    return np.array([weight @ errors[begin : begin + m] for begin in starts]).reshape(-1, 3)
 
 
 def transferred(model: Model, first: Prepared, second: Prepared) -> Model:
@@ -148,7 +190,7 @@ def _score(
     else:
         ran = _free_run_score(found.free_run(rows))
         ratio = force_scores(tau, base, found.tau, rows).ratio
-        mse = {axis: _number(value) for axis, value in zip(AXES, ratio.tolist(), strict=True)}
+        mse = _by_axis(ratio)
     return replace(
         ran,
         mse=mse,
@@ -162,8 +204,7 @@ def _score(
 
 def _base_score(tau: Floats, base: Prediction, rows: Rows, run: FreeRun) -> TransferScore:
     error = force_scores(tau, base.tau, base.tau, rows).mse_base
-    mse = {axis: _number(value) for axis, value in zip(AXES, error.tolist(), strict=True)}
-    return replace(_free_run_score(run), mse=mse)
+    return replace(_free_run_score(run), mse=_by_axis(error))
 
 
 def _free_run_score(run: FreeRun) -> TransferScore:
@@ -180,6 +221,15 @@ def _free_run_errors(run: FreeRun) -> tuple[str, float | None, float | None]:
     if not why and position is None:
         why = f"no stretch of {HORIZON_S:g} s in which position was measured"
     return why, position, heading
+
+
+def _power(errors: Floats) -> Floats:
+    """Return the mean square by axis, shape (3,); NaN without any."""
+    return np.asarray(np.mean(errors**2, axis=0)) if len(errors) else np.full(3, np.nan)
+
+
+def _by_axis(values: Floats) -> dict[str, float | None]:
+    return {axis: _number(value) for axis, value in zip(AXES, values.tolist(), strict=True)}
 
 
 def _number(value: float) -> float | None:

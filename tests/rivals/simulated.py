@@ -18,6 +18,7 @@ from ferryid.simulate.plant.hull import perturbed
 from ferryid.simulate.sections import Wind
 from ferryid.types import Floats
 from ferryid.validation import log_writer
+from ferryid.validation.plant.air import air_constants, air_load
 from ferryid.validation.plant.hull import drag, hull_constants
 from ferryid.validation.plant.trial import simulate_trial
 from ferryid.validation.plant.vessels import FERRY
@@ -25,6 +26,7 @@ from ferryid.validation.prior_profile import masses, profile_text
 from ferryid.vessel import load_profile, parse_profile
 from ferryid.vessel.parse_hull import DAMPING_TERMS
 from ferryid.vessel.profile import Profile
+from ferryid.vessel.wind import relative_wind_force
 from tests.rivals.methods import METHODS, Method
 from tests.rivals.scores import HORIZONS_S, free_runs
 from tests.rivals.task import Task
@@ -75,12 +77,18 @@ class Trial:
     hull: Profile | None
 
     def damping(self, nu: Floats) -> Floats:
-        """Return the force against the water's damping, shape (n, 3)."""
+        """Return the force against the damping of water and still air, shape (n, 3).
+
+        Of the two a log without a measured wind shows the sum, and the damping of every method is that sum.
+        """
         if self.hull is not None:
-            return damping_force(Estimator(self.hull, {}), self.mass, nu)
-        hull, force = hull_constants(FERRY), np.zeros((len(nu), 6))
+            assert self.hull.wind is not None
+            water = damping_force(Estimator(self.hull, {}), self.mass, nu)
+            return water - relative_wind_force(self.hull.wind, nu[:, 0], nu[:, 1])
+        hull, air, force = hull_constants(FERRY), air_constants(FERRY), np.zeros((len(nu), 6))
         for row, (u, v, r) in enumerate(nu):
             drag(hull, np.array([u, v, 0.0, 0.0, 0.0, r]), 0.0, 1.0, force[row])
+            air_load(air, -u, -v, force[row])
         return -force[:, [0, 1, 5]]
 
 

@@ -23,7 +23,7 @@ from ferryid.validation.records import TransferResult
 from ferryid.validation.rivals import stepwise
 from ferryid.validation.rivals.base import base_of, prepared_log
 from ferryid.validation.rivals.learner import LearnedModel, Learner
-from ferryid.validation.transfer_test import transfer_test, transferred
+from ferryid.validation.transfer_test import transfer_test, transferred, window_errors
 from ferryid.vessel import load_profile
 from ferryid.vessel.profile import Profile
 from tests.validation.two_logs import EAST_MPS, NORTH_MPS, WIND, two_logs
@@ -121,6 +121,29 @@ def test_a_rival_that_learnt_nothing_is_worth_the_base_model(scored: TransferRes
 
 def test_twice_the_error_is_four_times_its_square(scored: TransferResult) -> None:
     assert scored.methods["twice"].mse == pytest.approx({"surge": 4.0, "sway": 4.0, "yaw": 4.0})
+    assert scored.methods["twice"].windows == pytest.approx({"surge": 4.0, "sway": 4.0, "yaw": 4.0})
+    assert scored.methods["refuses"].windows == {}
+
+
+def test_noise_of_the_acceleration_averages_out_over_windows(scored: TransferResult) -> None:
+    """The true model leaves noise alone, of which an average over seconds holds less."""
+    true = scored.methods["diagnosed"]
+    assert all(0.0 < true.windows[axis] < 0.8 * true.mse[axis] for axis in true.mse)
+
+
+def test_windows_of_a_constant_error_hold_it_and_keep_to_unbroken_rows() -> None:
+    rows = np.ones(100, dtype=bool)
+    rows[40] = False
+    found = window_errors(np.full((100, 3), 2.0), rows, 10.0, 2.0)
+    # 20 rows a window, a new one every 10: three begin in the 40 rows before the gap, four in the 59 after it.
+    assert found == pytest.approx(np.full((7, 3), 2.0))
+    assert window_errors(np.ones((10, 3)), rows[:10], 10.0, 2.0).shape == (0, 3)
+
+
+def test_fast_noise_weighs_little_in_windows() -> None:
+    alternating = np.tile([[1.0], [-1.0]], (200, 3))
+    found = window_errors(alternating, np.ones(400, dtype=bool), 10.0, 4.0)
+    assert np.abs(found).max() < 1e-6
 
 
 def test_the_truth_of_the_first_log_holds_in_the_second(scored: TransferResult) -> None:
