@@ -10,7 +10,7 @@ from ferryid.compare.candidates import Candidate
 from ferryid.compare.comparison_result import Coefficient, CoefficientRow, EffectInModel, EffectRow, TermRow
 from ferryid.effects.force_model import COEFFICIENTS, LIFT, MASS, UNITS
 from ferryid.models import Model, StoredEffect
-from ferryid.models.forces import MAPPED, hull_coefficients, hull_contribution, model_estimator
+from ferryid.models.forces import MAPPED, hull_coefficients, model_estimator
 from ferryid.types import AXES, Floats
 
 PRODUCTS = (
@@ -60,8 +60,8 @@ _UNITS = {
 
 def _effective(model: Model) -> dict[str, Floats]:
     """Return value, low and high of every coefficient, shape (3,) each."""
-    hull, deviation = hull_coefficients(model), np.sqrt(np.maximum(hull_contribution(model)[1], 0.0))
-    found = {name: _interval(hull[k], deviation[k]) for k, name in enumerate(COEFFICIENTS)}
+    hull = hull_coefficients(model)
+    found = {name: hull[k] + _reach(model, name) for k, name in enumerate(COEFFICIENTS)}
     for name, told in model.hull.items():
         found[name] = np.array([told.value, told.low, told.high])
     force = model_estimator(model)
@@ -77,16 +77,26 @@ def _effective(model: Model) -> dict[str, Floats]:
     return found
 
 
+def _reach(model: Model, name: str) -> Floats:
+    """Return how far the interval of a hull's coefficient reaches from its value: 0, low and high, shape (3,).
+
+    Every basis has one function for each; what has none is the base model's, which has no interval.
+    """
+    for term, axis in MAPPED[name]:
+        if term in model.terms:
+            around = _term(model, term, axis)
+            around = around - around[0]
+            return around if name in MASS else _opposite(around)
+    return np.array([0.0, np.nan, np.nan])
+
+
 def _term(model: Model, term: str, axis: int) -> Floats:
+    """Return the coefficient of a term and its interval as the model file has them, shape (3,); none where it has no width."""
     if term not in model.terms:
         return np.array([0.0, np.nan, np.nan])
     k = model.terms.index(term)
-    return _interval(model.theta[k, axis], np.sqrt(max(float(model.covariance[axis, k, k]), 0.0)))
-
-
-def _interval(value: float, deviation: float) -> Floats:
-    reach = 1.96 * deviation if deviation > 0.0 else np.nan
-    return np.array([value, value - reach, value + reach])
+    low, high = model.low[k, axis], model.high[k, axis]
+    return np.array([model.theta[k, axis], *((low, high) if low < high else (np.nan, np.nan))])
 
 
 def _opposite(interval: Floats) -> Floats:
