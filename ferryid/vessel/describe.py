@@ -121,6 +121,8 @@ def _how(signal: Signal) -> str:
         parts.append("sign reversed")
     if signal.offset:
         parts.append(f"offset {signal.offset:+g}")
+    if signal.scale != 1.0:
+        parts.append(f"times {signal.scale:g}")
     if signal.element is not None:
         parts.append(f"of {signal.element[1]} in {signal.element[0]}")
     if signal.pulse_us is not None:

@@ -21,6 +21,8 @@ ROLE_KINDS = {"speed": "rotation", "angle": "angle", "rudder": "angle", "force":
 Chosen = tuple[Element, ...]
 SHARES = ("%", "fraction", "us")
 """Units of a signal that is a share of full power or of full travel."""
+SCALED, MOST_SCALE = ("velocity", "yaw_rate"), 100.0
+"""Quantities whose instruments may read too much or too little by a share, and the largest factor on them."""
 _OPTIONAL = ("wind", "current", "payload", "tau_d", "position_d", "heading_d", "roll", "pitch")
 
 
@@ -54,6 +56,7 @@ def _vessel_signal(quantity: str, table: TableReader) -> Signal | None:
     topic = table.text("topic", required=True)
     options: dict[str, str] = {}
     sign, offset = 1.0, 0.0
+    scale = table.number("scale", 1.0, above=0.0, within=MOST_SCALE) if quantity in SCALED else 1.0
     mount_m = (0.0, 0.0)
     frame = ""
     if quantity == "wind" and not table.has("fields"):
@@ -118,6 +121,7 @@ def _vessel_signal(quantity: str, table: TableReader) -> Signal | None:
         line=table.line(),
         mount_m=mount_m,
         where=where,
+        scale=scale,
     )
 
 
@@ -268,7 +272,11 @@ def _frame(table: TableReader, frames: tuple[str, ...], quantity: str) -> str:
 def _sign(table: TableReader) -> float:
     sign = table.number("sign", 1.0)
     if abs(sign) != 1.0:
-        table.fault(f'"sign" must be 1 or -1, found {sign:g}. Fix: a scale belongs into the unit', "sign")
+        table.fault(
+            f'"sign" must be 1 or -1, found {sign:g}. Fix: a scale belongs into the unit, that of a velocity or yaw rate '
+            'into "scale"',
+            "sign",
+        )
         return 1.0
     return sign
 

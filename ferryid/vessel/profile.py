@@ -122,11 +122,11 @@ class Signal:
 
     `quantity` is the key in the file (``position``, ``heading``, ``velocity``, ``yaw_rate``, ``wind``, ``payload`` or
     ``<actuator>.<speed|angle|rudder|force|thrust>`` with ``.command`` appended for orders); `line` is its line there.
-    A scalar is ``sign * value + offset`` in `unit`. A speed, force or angle in ``%``, ``fraction`` or ``us`` is a share of
-    `full` [rpm, N, rad]; `pulse_us` are the pulses of full astern, neutral and full ahead, and the dead band [us].
-    `mount_m` is where an antenna or a log sits, or a payload whose place is not measured (x forward, y starboard of the
-    body origin) [m]. On a topic of several signals `where` chooses its messages: fields and their values. In an array whose
-    entries have names, `element` is the array of names and the signal's own.
+    A scalar is ``sign * value + offset`` in `unit`; velocity and yaw rate are multiplied by `scale`. A speed, force or
+    angle in ``%``, ``fraction`` or ``us`` is a share of `full` [rpm, N, rad]; `pulse_us` are the pulses of full astern,
+    neutral and full ahead, and the dead band [us]. `mount_m` is where an antenna or a log sits, or a payload whose place is
+    not measured (x forward, y starboard of the body origin) [m]. On a topic of several signals `where` chooses its messages:
+    fields and their values. In an array whose entries have names, `element` is the array of names and the signal's own.
     """
 
     quantity: str
@@ -143,6 +143,7 @@ class Signal:
     mount_m: tuple[float, float] = (0.0, 0.0)
     where: tuple[tuple[str, float], ...] = ()
     pulse_us: tuple[float, float, float, float] | None = None
+    scale: float = 1.0
     element: Element | None = None
 
 

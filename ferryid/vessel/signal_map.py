@@ -226,7 +226,8 @@ def _convert(signal: Signal, values: list[Floats], topic: str) -> list[Floats]:
     if quantity in ("position", "position_d"):
         return _position(signal, values, topic)
     if quantity in ("velocity", "current") or (quantity == "wind" and signal.frame):
-        return _turned([value * factor(signal.unit, "speed") for value in values], signal.frame)
+        scale = factor(signal.unit, "speed") * signal.scale
+        return _turned([value * scale for value in values], signal.frame)
     if quantity in ("heading", "heading_d"):
         return [_heading(signal, values)]
     if quantity == "wind":
@@ -241,7 +242,7 @@ def _convert(signal: Signal, values: list[Floats], topic: str) -> list[Floats]:
         flip = -1.0 if signal.frame == "FLU" else 1.0
         return [values[0] * force, values[1] * (force * flip), values[2] * (moment * flip)]
     if quantity == "yaw_rate":
-        rate = _scalar(signal, values[0], factor(signal.unit, "rate"))
+        rate = _scalar(signal, values[0], factor(signal.unit, "rate") * signal.scale)
         return [-rate if signal.frame in ("FLU", "ENU") else rate]
     if quantity in ("roll", "pitch"):
         angle = _scalar(signal, values[0], factor(signal.unit, "angle"))

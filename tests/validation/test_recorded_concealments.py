@@ -28,6 +28,7 @@ from ferryid.validation.recorded.effects.waves import series
 from ferryid.validation.recorded.hull import current_load, damping, wind_load
 from ferryid.validation.recorded.log import RecordedLog
 from ferryid.validation.recorded.signal_values import with_columns
+from ferryid.vessel.signal_map import convert
 from tests.validation.recorded_logs import KINDS, ferry, folder, tanker, written
 
 pytestmark = pytest.mark.slow
@@ -107,6 +108,20 @@ def test_a_heading_turns_and_the_tilt_stays() -> None:
     wanted = quaternion(np.full(n, 0.1), np.full(n, -0.2), np.full(n, 1.5))
     for name, values in zip(names, wanted, strict=True):
         assert np.allclose(made.columns[name], values), name
+
+
+def test_a_signal_that_is_scaled_is_written_as_its_instrument_reads() -> None:
+    log = ferry()
+    own = log.series[log.topics["u"]]
+    n = len(own.receive_ns)
+    signals = tuple(
+        replace(one, scale=0.8) if one.quantity in ("velocity", "yaw_rate") else one for one in log.profile.signals
+    )
+    new = {"u": np.linspace(-1.0, 1.0, n), "v": np.full(n, 0.2), "r": np.full(n, 0.05)}
+    profile = replace(log.profile, signals=signals)
+    read = convert(profile, with_columns(profile, own, new))
+    for name, values in new.items():
+        assert np.allclose(read[name], values), name
 
 
 def test_paths_of_messages_lead_where_they_led(tmp_path: Path) -> None:

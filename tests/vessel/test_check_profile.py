@@ -309,6 +309,8 @@ CASES = {
         "no surge and sway velocity is available",
     ),
     "sign": ('field = "a"\nunit = "rad"', 'field = "a"\nunit = "rad"\nsign = -2@', "must be 1 or -1"),
+    "scale of nothing": ("[signals.velocity]", "[signals.velocity]\nscale = 0@", '"scale" must be above 0, found 0'),
+    "scale beyond any unit": ("[signals.yaw_rate]", "[signals.yaw_rate]\nscale = 500@", "at most 100 in size"),
     "body frame for a heading": (
         "[signals.yaw_rate]",
         '[signals.heading]\ntopic = "/h"\nfield = "h"\nunit = "rad"\nframe = "FRD"@\n[signals.yaw_rate]',

@@ -198,6 +198,16 @@ def test_port_positive_body_frame_in_knots_and_degrees() -> None:
     assert given.columns["u"][0] == 10.0
 
 
+@pytest.mark.parametrize("quantity", ["velocity", "yaw_rate"])
+def test_an_instrument_that_reads_too_much_is_scaled(quantity: str) -> None:
+    given = series("/nav", u=[10.0], v=[1.0], r=[90.0])
+    plain = convert(profile(BODY), given)
+    text = BODY.replace(f"[signals.{quantity}]\n", f"[signals.{quantity}]\nscale = 0.8\n")
+    found = convert(profile(text), given)
+    for name, own in (("u", "velocity"), ("v", "velocity"), ("r", "yaw_rate")):
+        assert found[name] == pytest.approx((0.8 if own == quantity else 1.0) * plain[name])
+
+
 def test_world_frame_east_first() -> None:
     columns = convert(profile(WORLD), series("/nav", ve=[1.0], vn=[2.0], yaw=[90.0], e=[0.003], n=[0.004]))
     assert {name: pytest.approx(values) for name, values in columns.items()} == {

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
 from ferryid.types import Floats
+from ferryid.vessel.profile import Profile, Signal
 
 
 @dataclass(frozen=True)
@@ -83,6 +84,9 @@ class Check:
         none. None of checks whose errors have no size below what is found.
     lasting
         Of errors that a sensor keeps; None of events.
+    in_profile
+        ``in_profile(profile, values)`` returns the line of the profile that corrects an error of these values in every log, and
+        under which heading; empty where the signal map cannot.
     """
 
     id: str
@@ -91,3 +95,17 @@ class Check:
     place: int
     estimate: Callable[[Measurements], Mapping[str, Estimate]] | None = None
     lasting: Lasting | None = None
+    in_profile: Callable[[Profile, Mapping[str, float]], str] = lambda profile, values: ""
+
+
+def mapped(profile: Profile, quantity: str) -> Signal | None:
+    """Return the signal of a profile that gives a quantity; None where it has none."""
+    return next((one for one in profile.signals if one.quantity == quantity), None)
+
+
+def rescaled(profile: Profile, quantity: str, factor: float) -> str:
+    """Return the line of the profile that divides a signal by a positive factor; empty without such a signal."""
+    signal = mapped(profile, quantity)
+    if signal is None or factor <= 0.0:
+        return ""
+    return f"scale = {signal.scale / factor:.4g} in [signals.{quantity}]"

@@ -12,11 +12,13 @@ from math import degrees, radians
 
 import numpy as np
 
-from ferryid.diagnose.checks.check import Check, Lasting, SensorFinding
+from ferryid.diagnose.checks.check import Check, Lasting, SensorFinding, mapped
 from ferryid.diagnose.checks.kinematics import ANGLE, SIZE, Kinematics, kinematics
 from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
+from ferryid.vessel.profile import Profile
+from ferryid.vessel.units import factor
 
 
 def find(measurements: Measurements) -> SensorFinding | None:
@@ -54,6 +56,16 @@ def estimate(measurements: Measurements) -> dict[str, Estimate]:
     return {} if found is None else {"angle": _angle(found)}
 
 
+def in_profile(profile: Profile, values: Mapping[str, float]) -> str:
+    """Return the line that takes the bias off the heading as it is mapped."""
+    signal = mapped(profile, "heading")
+    if signal is None:
+        return ""
+    turned = values["angle"] if signal.frame == "ENU" else -values["angle"]
+    key, unit = ("offset_deg", "deg") if signal.unit == "quaternion" else ("offset", signal.unit)
+    return f"{key} = {signal.offset + radians(turned) / factor(unit, 'angle'):.4g} in [signals.heading]"
+
+
 def _angle(found: Kinematics) -> Estimate:
     return found.solution.estimate(ANGLE, "deg", degrees(1.0))
 
@@ -65,4 +77,5 @@ CHECK = Check(
     50,
     estimate,
     Lasting(0.0, degrees(SIZE[ANGLE]), lambda _: CHECKS.least_angle_deg, says_of, corrected),
+    in_profile,
 )

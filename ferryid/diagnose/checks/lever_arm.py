@@ -11,12 +11,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from ferryid.diagnose.checks.check import Check, Lasting, SensorFinding
+from ferryid.diagnose.checks.check import Check, Lasting, SensorFinding, mapped
 from ferryid.diagnose.checks.kinematics import SIZE, Kinematics, X, Y, kinematics
 from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
 from ferryid.vessel.frames import to_world
+from ferryid.vessel.profile import Profile
 
 
 def least_m(measurements: Measurements) -> float:
@@ -64,6 +65,15 @@ def estimate(measurements: Measurements) -> dict[str, Estimate]:
     return {} if found is None else dict(zip("xy", _place(found), strict=True))
 
 
+def in_profile(profile: Profile, values: Mapping[str, float]) -> str:
+    """Return the line that carries positions to where the velocities were measured."""
+    signal = mapped(profile, "position")
+    if signal is None:
+        return ""
+    x, y = signal.mount_m[0] + values["x"], signal.mount_m[1] + values["y"]
+    return f"mount_m = [{x:.2f}, {y:.2f}] in [signals.position], if it is the velocity that is the body origin's"
+
+
 def _place(found: Kinematics) -> tuple[Estimate, Estimate]:
     return found.solution.estimate(X, "m"), found.solution.estimate(Y, "m")
 
@@ -75,4 +85,5 @@ CHECK = Check(
     60,
     estimate,
     Lasting(0.0, float(SIZE[X]), least_m, says_of, corrected),
+    in_profile,
 )

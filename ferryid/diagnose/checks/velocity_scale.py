@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ferryid.diagnose.checks.check import Check, Lasting, SensorFinding
+from ferryid.diagnose.checks.check import Check, Lasting, SensorFinding, rescaled
 from ferryid.diagnose.checks.kinematics import SCALE, SIZE, kinematics
 from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.diagnose.data.estimate import Estimate
@@ -65,4 +65,5 @@ CHECK = Check(
     40,
     estimate,
     Lasting(1.0, float(SIZE[SCALE]), lambda _: CHECKS.least_scale, says_of, corrected),
+    lambda profile, values: rescaled(profile, "velocity", values["factor"]),
 )

@@ -12,13 +12,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ferryid.diagnose.checks.check import Check, Lasting, SensorFinding
+from ferryid.diagnose.checks.check import Check, Lasting, SensorFinding, mapped, rescaled
 from ferryid.diagnose.checks.regression import Solution, independence, step
 from ferryid.diagnose.checks.spans import LENGTH_S, STRIDE_S, Spans, spans
 from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
 from ferryid.types import Floats
+from ferryid.vessel.profile import Profile
 
 OVERLAP = LENGTH_S / STRIDE_S
 """Windows that have one stretch of time in common: only every so many are independent."""
@@ -152,6 +153,14 @@ def _growing(power: Floats, by: Floats, overlap: float) -> Floats:
     return np.asarray(level + slope * by + 1e-3 * power.mean() + 1e-18)
 
 
+def in_profile(profile: Profile, values: Mapping[str, float]) -> str:
+    """Return the line that scales the rate, or turns its sign round."""
+    signal = mapped(profile, "yaw_rate")
+    if signal is not None and values["factor"] < 0.0:
+        return f"sign = {-signal.sign:g} in [signals.yaw_rate]"
+    return rescaled(profile, "yaw_rate", values["factor"])
+
+
 def estimate(measurements: Measurements) -> dict[str, Estimate]:
     """Return the factor however near to 1; see `find`."""
     rates = compared(measurements)
@@ -171,4 +180,5 @@ CHECK = Check(
         says_of,
         lambda measured, values: corrected(measured, values["factor"]),
     ),
+    in_profile,
 )

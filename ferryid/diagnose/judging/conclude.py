@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.counts import counted
+from ferryid.diagnose.checks import checks
 from ferryid.diagnose.checks.screening import ScreenedLog
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.campaign import repeated
@@ -169,7 +170,7 @@ def _too_short(
         findings,
         before,
         after,
-        (*survey_notes(screened), *noted, short, *notes),
+        (*survey_notes(screened), *remedies(screened, findings), *noted, short, *notes),
         evidence=_measured(log.windows) if errors is None else _leftover(errors.windows, errors.before, errors.after),
         duration_s=_duration_s(screened),
         left_out=screened.measured.survey.motion.left_out,
@@ -216,6 +217,7 @@ def _concluded(
     remainder = Remainder(is_testable(chances, still), bool(stands.dropped), ratio, left)
     notes = (
         *survey_notes(screened),
+        *remedies(screened, findings),
         *estimated.expectation.notes,
         *noted,
         *stands.dropped,
@@ -273,6 +275,18 @@ def _confident(
         return first
     figures = replace(figures, hull_doubt=impossible.doubt)
     return judged()
+
+
+def remedies(log: ScreenedLog, findings: Sequence[Finding]) -> tuple[str, ...]:
+    """Return which lines of the profile correct the sensors' errors that are sure, so that every command reads them right."""
+    known, notes = {one.id: one for one in checks()}, []
+    sure = {one.effect for one in findings if one.sure}
+    for one in log.sensors:
+        values = {name: estimate.value for name, estimate in one.parameters.items()}
+        line = known[one.effect].in_profile(log.measurements.profile, values) if one.effect in sure & set(known) else ""
+        if line:
+            notes.append(f"{one.says.rstrip('.')}. In the profile, {line} corrects that for every command.")
+    return tuple(notes)
 
 
 def survey_notes(log: ScreenedLog) -> tuple[str, ...]:

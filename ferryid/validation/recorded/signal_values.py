@@ -64,7 +64,7 @@ def _raw(signal: Signal, fields: list[Column], old: list[Floats], new: list[Floa
     if quantity == "position" and signal.frame == "geodetic":
         return [_moved(field, a, b) for field, a, b in zip(fields, old, new, strict=True)]
     if quantity in ("position", "velocity"):
-        scale = factor(signal.unit, "length" if quantity == "position" else "speed")
+        scale = factor(signal.unit, "length" if quantity == "position" else "speed") * signal.scale
         return [value / scale for value in _turned(new, signal.frame)]
     if quantity == "heading":
         turn = wrap(new[0] - old[0])
@@ -74,7 +74,7 @@ def _raw(signal: Signal, fields: list[Column], old: list[Floats], new: list[Floa
         return [_angle(signal, fields[0], turn)]
     if quantity == "yaw_rate":
         rate = -new[0] if signal.frame in ("FLU", "ENU") else new[0]
-        return [_scalar(signal, rate, factor(signal.unit, "rate"))]
+        return [_scalar(signal, rate, factor(signal.unit, "rate") * signal.scale)]
     role = quantity.partition(".")[2].removesuffix(".command")
     if role not in _ROLE_KIND:
         raise ValueError(f"{quantity} is not rewritten")

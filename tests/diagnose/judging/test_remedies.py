@@ -1,0 +1,41 @@
+"""What corrects a sensor's error in the profile is said where the error is sure, and not where it is a hint."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ferryid.diagnose.checks import SensorFinding
+from ferryid.diagnose.checks.screening import ScreenedLog
+from ferryid.diagnose.data.estimate import Estimate
+from ferryid.diagnose.judging.conclude import remedies
+from ferryid.effects.force_model import Measurements
+from ferryid.vessel import load_profile
+from tests.diagnose.judging.findings import found
+
+PROFILE = load_profile("milliampere")
+
+
+def screened(*effects: str) -> ScreenedLog:
+    rest, nothing = np.zeros((2, 3)), np.zeros((2, 0))
+    seen = Measurements(PROFILE, np.arange(2.0), rest, rest, rest, rest[:, :0], nothing, np.ones(2, dtype=np.bool_))
+    whole: Any = None
+    factor = {"factor": Estimate(1.25, 1.2, 1.3, "-")}
+    errors = tuple(SensorFinding(one, factor, f"The {one} is 1.25.", lambda measured: measured) for one in effects)
+    return ScreenedLog(whole, seen, errors)
+
+
+def test_the_line_of_the_profile_follows_a_sure_error() -> None:
+    sure = found("yaw_rate_scale")
+    says = (
+        "The yaw_rate_scale is 1.25. In the profile, scale = 0.8 in [signals.yaw_rate] corrects that for every command."
+    )
+    assert remedies(screened("yaw_rate_scale"), [sure]) == (says,)
+    assert remedies(screened("yaw_rate_scale"), [replace(sure, probability=0.4)]) == ()
+    assert remedies(screened("yaw_rate_scale"), []) == ()
+
+
+def test_what_the_signal_map_cannot_correct_has_no_line() -> None:
+    assert remedies(screened("held_samples"), [found("held_samples")]) == ()
