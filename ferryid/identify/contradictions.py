@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ferryid.identify.thresholds import IDENTIFY
@@ -10,7 +12,7 @@ from ferryid.types import AXES, Flags, Floats
 _FORCES = ("surge force", "sway force", "yaw moment")
 
 
-def wrong_way(response: Floats, spread: Floats, profile: str) -> str:
+def wrong_way(response: Floats, spread: Floats, profile: str, angles: Sequence[str] = (), actuators: int = 2) -> str:
     """Return what is wrong and how to mend it where the vessel accelerates against the applied force; empty where it does not.
 
     Parameters
@@ -22,6 +24,10 @@ def wrong_way(response: Floats, spread: Floats, profile: str) -> str:
         Its standard deviation, shape (3,).
     profile
         Where the profile stands.
+    angles
+        Signals that say where actuators push, such as ``stern.rudder``.
+    actuators
+        How many there are: one cannot be taken for another.
     """
     wrong = [axis for axis in range(3) if response[axis] < -IDENTIFY.wrong_way_sigmas * spread[axis]]
     if not wrong:
@@ -43,10 +49,13 @@ def wrong_way(response: Floats, spread: Floats, profile: str) -> str:
         cause = "the actuators and the motion have y axes that point to opposite sides"
         remedy = 'set frame = "FLU" for velocity and yaw rate, or change the sign of y in position_m of the actuators'
     else:
-        cause = (
-            "actuators are exchanged (port and starboard, bow and stern), or heading and yaw rate count anticlockwise"
-        )
-        remedy = "exchange the signals of the actuators, or set the frames of heading and yaw rate"
+        causes = ["actuators are exchanged (port and starboard, bow and stern)"] if actuators > 1 else []
+        causes += ["an angle has the wrong sign"] if angles else []
+        remedies = ["exchange the signals of the actuators"] if actuators > 1 else []
+        tables = " or ".join(f'[signals."{one}"]' for one in angles)
+        remedies += [f"turn the sign in {tables}"] if angles else []
+        cause = ", or ".join([*causes, "heading and yaw rate count anticlockwise"])
+        remedy = ", or ".join([*remedies, "set the frames of heading and yaw rate"])
     return f"{told}: {cause}. Fix: in {profile}, {remedy}"
 
 

@@ -10,6 +10,7 @@ from ferryid.errors import FerryIdError
 from ferryid.identify.estimation import estimate_correction
 from ferryid.identify.motion_data import LogData
 from ferryid.identify.outcome import EstimatorScore
+from ferryid.identify.physical_checks import physical_checks
 from ferryid.identify.settings import FOLDS
 from ferryid.identify.split import Split
 from ferryid.identify.weak_data import WeakData
@@ -29,12 +30,6 @@ def fold_error(data: LogData, components: int) -> float:
         if windows:
             base, model = base + windows * errors.mse_base, model + windows * errors.mse_model
     return mean_ratio(base, model)
-
-
-def held_out_error(data: LogData, components: int) -> float:
-    """Return the squared prediction error over the base model's on the rows that validate."""
-    errors = data.windows.errors(estimate_correction(data, components, 0, no_progress).coefficients)
-    return mean_ratio(errors.mse_base, errors.mse_model)
 
 
 def mean_ratio(base: Floats, model: Floats) -> float:
@@ -72,6 +67,8 @@ def choose_estimator(
 ) -> tuple[LogData, tuple[EstimatorScore, ...]]:
     """Return the data of the estimator of less error on folds of the training rows, and the scores of both.
 
+    One whose inertia or damping no hull can have gives way to one that is possible and better than the base model.
+
     Parameters
     ----------
     derivative, weak
@@ -81,9 +78,13 @@ def choose_estimator(
     """
     both: dict[str, LogData] = {"weak": weak, "derivative": derivative}
     errors = {name: fold_error(data, components[name]) for name, data in both.items()}
-    name = "derivative" if errors["derivative"] < errors["weak"] else "weak"
-    scores = tuple(
-        EstimatorScore(each, errors[each], held_out_error(data, components[each]), each == name)
-        for each, data in both.items()
-    )
-    return both[name], scores
+    held_out, possible = dict[str, float](), dict[str, bool]()
+    for name, data in both.items():
+        found = estimate_correction(data, components[name], 0, no_progress).coefficients
+        judged = data.windows.errors(found)
+        held_out[name] = mean_ratio(judged.mse_base, judged.mse_model)
+        possible[name] = all(one.passed is not False for one in physical_checks(data, data.combined(found)))
+    # The order settles what is alike.
+    chosen = min(both, key=lambda name: (not (possible[name] and errors[name] < 1.0), errors[name]))
+    scores = tuple(EstimatorScore(name, errors[name], held_out[name], name == chosen, possible[name]) for name in both)
+    return both[chosen], scores

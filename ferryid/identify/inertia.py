@@ -44,6 +44,17 @@ def scaled_eigenvalue(profile: Profile, mass: Floats) -> float:
     return float(np.linalg.eigvalsh((mass + mass.T) / 2 / np.outer(root, root))[0])
 
 
+def largest_inertia(profile: Profile, mass: Floats) -> tuple[float, int]:
+    """Return the largest eigenvalue of a mass matrix with respect to the rigid body's, and the axis that it is most of.
+
+    It is the largest inertia in any direction over the rigid body's in the same direction: where sway and yaw are coupled,
+    another one than those on the diagonal.
+    """
+    root = np.linalg.inv(np.linalg.cholesky(rigid_body(profile.hull)))
+    values, vectors = np.linalg.eigh(root @ ((mass + mass.T) / 2) @ root.T)
+    return float(values[-1]), int(np.argmax(np.abs(vectors[:, -1])))
+
+
 def without_inertia(mask: Flags, terms: Sequence[str], axes: Flags) -> Flags:
     """Return the mask of a basis, shape (K, 3), without the acceleration terms on the given axes."""
     kept = mask.copy()

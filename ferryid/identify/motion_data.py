@@ -185,11 +185,9 @@ class LogData(MotionData):
         )
 
     def scores(self, found: Coefficients, logs: Sequence[LogFit]) -> ModelScores:
-        """Return force errors for the thesis's estimator alone, and otherwise prediction errors in windows."""
-        if (
-            self.settings.estimator == "derivative"
-            or sum(len(one) for one in self.windows.judged) < IDENTIFY.fewest_judged
-        ):
+        """Return prediction errors in windows; force errors for the thesis's estimator by its own criterion."""
+        thesis = self.settings.estimator == "derivative" and self.settings.accept == "thesis"
+        if thesis or sum(len(one) for one in self.windows.judged) < IDENTIFY.fewest_judged:
             return super().scores(found, logs)
         return self.windows.scores(found)
 

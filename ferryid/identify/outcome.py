@@ -131,16 +131,25 @@ class EstimatorScore:
         The same of an estimate from all training rows, on the rows that validate.
     chosen
         Whether the model comes of it.
+    possible
+        Whether a hull can have its inertia and damping.
     """
 
     name: str
     folds: float
     held_out: float
     chosen: bool
+    possible: bool = True
 
     def to_json(self) -> dict[str, Any]:
         """Return the score as plain values."""
-        return {"name": self.name, "folds": self.folds, "held_out": self.held_out, "chosen": self.chosen}
+        return {
+            "name": self.name,
+            "folds": self.folds,
+            "held_out": self.held_out,
+            "chosen": self.chosen,
+            "possible": self.possible,
+        }
 
 
 @dataclass(frozen=True)
@@ -172,7 +181,7 @@ class LogWind:
         speed, towards = hypot(north, east), degrees(atan2(east, north)) % 360.0
         if not self.significant:
             return f"{self.log}: none that differs from zero"
-        return f"{self.log}: {speed:.1f} m/s towards {towards:.0f}° (estimated, not confirmed)"
+        return f"{self.log}: {speed:.1f} m/s towards {towards:.0f}° (estimated, not confirmed; a current may be taken for it)"
 
     def to_json(self) -> dict[str, Any]:
         """Return the wind as plain values."""

@@ -7,8 +7,10 @@ from collections.abc import Callable
 import numpy as np
 
 from ferryid.identify.acceptance import Check
-from ferryid.identify.inertia import relative_inertia, scaled_eigenvalue
+from ferryid.identify.fit_data import Coefficients, FitData
+from ferryid.identify.inertia import largest_inertia, relative_inertia, scaled_eigenvalue
 from ferryid.identify.thresholds import IDENTIFY
+from ferryid.models.forces import Estimator, effective_mass
 from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
 
@@ -35,19 +37,21 @@ def inertia_checks(profile: Profile, mass: Floats) -> tuple[Check, ...]:
             else f"{says}: a force in some direction would accelerate the model backwards, and it cannot be simulated.",
         )
     ]
-    for axis, share in zip(AXES, relative_inertia(profile, mass).tolist(), strict=True):
+    largest, of_axis = largest_inertia(profile, mass)
+    for number, (axis, share) in enumerate(zip(AXES, relative_inertia(profile, mass).tolist(), strict=True)):
         low, high = IDENTIFY.least_inertia, IDENTIFY.most_inertia
         lowest, highest = low * (1.0 - _ROUNDING), high * (1.0 + _ROUNDING)
         # Only the upper bound counts against a model: noise takes some inertia, but nothing gives that much of it.
-        at_most = share > high * (1.0 - _ROUNDING)
+        coupled = number == of_axis and largest > high * (1.0 - _ROUNDING) >= share
+        at_most = coupled or share > high * (1.0 - _ROUNDING)
         possible = lowest <= share and not at_most
         if low * (1.0 + _ROUNDING) < share and not at_most:
             meaning = "it is possible"
         elif lowest <= share <= highest and at_most:
             meaning = (
-                "it is held at that bound, and the data would have more, which no hull has: the applied force may be too "
-                "large, or the actuators were not engaged. Fix: in the profile, correct the unit of the actuators' signals, "
-                "the thrust curve or mass_kg"
+                "it is held at that bound, and the data would have more, which no hull has: the applied force may be "
+                "too large or of the wrong sign, or the actuators were not engaged. Fix: in the profile, correct the unit and "
+                "sign of the actuators' signals, the thrust curve or mass_kg"
             )
         elif possible:
             meaning = "it is held at that bound, beyond which the data would have it"
@@ -62,8 +66,9 @@ def inertia_checks(profile: Profile, mass: Floats) -> tuple[Check, ...]:
                 share,
                 high if at_most else low,
                 "of the rigid body's",
-                f"The effective inertia in {axis} is {share:.2f} times the rigid body's, and {low:g} to {high:g} is possible: "
-                f"{meaning}.",
+                f"The effective inertia in {axis} is {share:.2f} times the rigid body's"
+                f"{f', {largest:.2f} with its coupling to the other axes' if coupled else ''}, and {low:g} to {high:g} is "
+                f"possible: {meaning}.",
             )
         )
     return tuple(checks)
@@ -132,3 +137,14 @@ def _feeding_share(force: Callable[[Floats], Floats], nu: Floats, whole: float) 
     power = np.sum(nu * damping, axis=1)
     usual = max(float(np.mean(np.abs(power))), IDENTIFY.damping_power * whole)
     return float(np.mean(power < -IDENTIFY.damping_power * usual))
+
+
+def physical_checks(data: FitData, found: Coefficients) -> tuple[Check, ...]:
+    """Return whether the inertia and the damping of a fit's coefficients, base model included, can be a hull's."""
+    profile, scale, functions = data.profile, data.settings.scale, data.functions
+    law = Estimator(profile, scale, functions, found.theta, found.intercept)
+    every = (
+        *inertia_checks(profile, effective_mass(profile, scale, functions.terms, found.theta)),
+        *damping_checks(law.at_constant_velocity, data.visited),
+    )
+    return tuple(check for check in every if not (data.settings.reduced and check.name.endswith("_sway")))

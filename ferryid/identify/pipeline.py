@@ -26,14 +26,13 @@ from ferryid.identify.log_sums import folds_by_blocks, force_free_axes, sum_log
 from ferryid.identify.model_selection import Selection, select_model, windows_to_try
 from ferryid.identify.motion_data import LogData, compute_residuals, numbered_names
 from ferryid.identify.outcome import ComponentCurve, EstimatorScore, Excitation, FitOutcome
-from ferryid.identify.physical_checks import damping_checks, inertia_checks
+from ferryid.identify.physical_checks import physical_checks
 from ferryid.identify.rows import basis_for
 from ferryid.identify.settings import TEST_WINDOW_S, FitSettings, check_components
 from ferryid.identify.split import Split, split_rows
 from ferryid.identify.weak_data import WeakData, weak_data
 from ferryid.identify.window_length import with_best_length
 from ferryid.models import Model, ModelScores
-from ferryid.models.forces import Estimator, effective_mass
 from ferryid.models.prediction import FreeRun
 from ferryid.models.store import check_name
 from ferryid.regression.bases import Basis
@@ -150,15 +149,11 @@ def _checks(
     data: FitData, found: Coefficients, scores: ModelScores, free_base: FreeRun, free_new: FreeRun
 ) -> tuple[Check, ...]:
     """Return what the full criterion asks for besides the held-out error."""
-    profile, scale, functions = data.profile, data.settings.scale, data.functions
-    law = Estimator(profile, scale, functions, found.theta, found.intercept)
-    every = (
-        *inertia_checks(profile, effective_mass(profile, scale, functions.terms, found.theta)),
-        *damping_checks(law.at_constant_velocity, data.visited),
+    return (
+        *physical_checks(data, found),
         *free_run_checks(free_base, free_new),
         *held_out_checks(scores.seconds, data.held_out_blocks, scores.split),
     )
-    return tuple(check for check in every if not (data.settings.reduced and check.name.endswith("_sway")))
 
 
 def _model(

@@ -464,7 +464,9 @@ class WeakData(LogData):
         response, spread = response_of(gains, self.information, mask, places)
         where = f"the profile {self.profile.name}"
         share = relative_inertia(self.profile, self.windows.base_mass)
-        if told := wrong_way(response, spread, where) or wrong_size(response, spread, share, where):
+        angles = [one.quantity for one in self.profile.signals if one.quantity.endswith((".rudder", ".angle"))]
+        against = wrong_way(response, spread, where, angles, len(self.profile.actuators))
+        if told := against or wrong_size(response, spread, share, where):
             raise FerryIdError(f"{self.where}: {told}")
 
     def feasible(self, gains: Floats, mask: Flags) -> Feasible:

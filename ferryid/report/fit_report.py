@@ -193,7 +193,7 @@ def as_text(result: FitOutcome, stored: StoredModel, report: Path | None) -> str
         )
         lines.append(
             f"estimator {one.name}: squared prediction error over the base model's: {folds}, {_number(one.held_out)} held out"
-            f"{'; chosen' if one.chosen else ''}"
+            f"{'' if one.possible else '; no hull has such inertia or damping'}{'; chosen' if one.chosen else ''}"
         )
     lines.extend(f"wind, estimated: {one}" for one in result.winds)
     lines.extend([""] if result.estimators or result.winds else [])

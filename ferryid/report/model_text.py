@@ -63,6 +63,7 @@ def render_model(model: Model) -> str:
     data = model_to_json(model)
     settings = model.settings
     force = None if model.scores is None else model.scores.force
+    measure = "" if model.scores is None else model.scores.measure
     mean, ratio = (None, [None] * 3) if force is None else (force.normalised_mse, force.ratio.tolist())
     wide = max([14, *(len(term) + 2 for axis in AXES for term in data["coefficients"][axis])])
     lines = [
@@ -71,7 +72,7 @@ def render_model(model: Model) -> str:
         if model.diagnosed and not model.terms
         else describe_settings(model),
         f"trained on {', '.join(str(log['name']) for log in model.training)}",
-        f"validation force MSE over the base model's: {_number(mean)} ("
+        f"validation {measure} MSE over the base model's: {_number(mean)} ("
         + ", ".join(f"{axis} {_number(value)}" for axis, value in zip(AXES, ratio, strict=True))
         + ")",
         "",

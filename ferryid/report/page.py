@@ -102,7 +102,9 @@ def _context(result: FitOutcome, interactive: Interactive) -> dict[str, Any]:
         "reasons": verdict.reasons,
         "estimators": [
             {
-                "name": one.name + (", used" if one.chosen else ""),
+                "name": one.name
+                + (", used" if one.chosen else "")
+                + ("" if one.possible else ", physically impossible"),
                 "folds": f"{one.folds:.3f}" if isfinite(one.folds) else "unknown, too short for it",
                 "held_out": f"{one.held_out:.3f}" if isfinite(one.held_out) else "–",
             }
@@ -168,7 +170,8 @@ def _context(result: FitOutcome, interactive: Interactive) -> dict[str, Any]:
                 "caption": "Coefficients of the correction, each over half the width of its own 95 % block-bootstrap "
                 "interval; an arrow goes on beyond the frame. Grey ones are not distinguishable from zero, pale orange ones "
                 "not from each other: the data do not determine them. Intervals hold the scatter at this number of "
-                "components, not the shrinkage that few components bring.",
+                "components; those of the derivative's estimator hold neither the bias by noise in the derivative nor the "
+                "shrinkage that few components bring.",
             },
         ],
         "coefficients": _coefficients(result),

@@ -51,6 +51,8 @@ def roll_back_version(name: str, out: Path, to: int | None = None) -> tuple[dict
 def _verdict(new: Model, current: int | None, found: Replay | None) -> tuple[bool, str]:
     """Return whether a version may become current, and why or why not."""
     if found is None:
+        if not new.accepted and current is None:
+            return False, "It was rejected by its fit, and no version is current that a replay could compare it with."
         if not new.accepted:
             return False, "It was rejected by its fit, and it was not replayed on any log."
         if current is None:
@@ -88,7 +90,8 @@ def _told(
 ) -> tuple[dict[str, Any], str]:
     lines = [f"{new.label} is {'current' if promoted else 'not made current'}. {reason}"]
     if not promoted:
-        lines.append("Fix: replay it on logs that neither was trained on, or use --force, which the history mentions")
+        replay = "" if before is None else "replay it on logs that neither was trained on, or "
+        lines.append(f"Fix: {replay}use --force, which the history mentions")
     if found is not None:
         title = "rms error of free runs" if found.free else "rms error, no free runs"
         lines += ["", f"{title:<28}{f'@{new.version}':>10}{f'@{before}':>10}  ratio (95 % interval)"]

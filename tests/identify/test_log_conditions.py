@@ -184,7 +184,10 @@ def test_the_coriolis_force_may_change_as_far_as_the_mass_may() -> None:
 
 
 def test_a_wind_is_worded_by_speed_direction_and_scatter() -> None:
-    assert str(LogWind("a", (-3.0, 3.0), (0.1, 0.1))) == "a: 4.2 m/s towards 135° (estimated, not confirmed)"
+    assert (
+        str(LogWind("a", (-3.0, 3.0), (0.1, 0.1)))
+        == "a: 4.2 m/s towards 135° (estimated, not confirmed; a current may be taken for it)"
+    )
     none = LogWind("b", (0.1, 0.0), (0.2, 0.2))
     assert not none.significant
     assert str(none) == "b: none that differs from zero"
