@@ -75,7 +75,7 @@ def gather(
             return average(screen_sensors(measure_log(path, profile, run, withhold=withhold), run.progress))
         except FerryIdError as error:
             # A path that leads nowhere is a slip of the pen, no log that cannot be used.
-            if not (Path(path).exists() or all(Path(part).exists() for part in path.split("+"))):
+            if not leads_somewhere(path):
                 raise
             return error
 
@@ -91,6 +91,11 @@ def gather(
     ]
     kept, why = sort_out(found, whose)
     return Gathered(tuple(kept), (*notes, *why, *_clocks(kept)))
+
+
+def leads_somewhere(path: str) -> bool:
+    """Return whether the path of a log, or those of all of its parts joined by ``+``, exist."""
+    return Path(path).exists() or all(Path(part).exists() for part in path.split("+"))
 
 
 def with_common_sensors(logs: Sequence[AveragedLog]) -> tuple[AveragedLog, ...]:

@@ -7,7 +7,15 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path, PurePath
 
-from ferryid.diagnose.gathering import Gathered, Group, gather, part, with_common_sensors, without_logs
+from ferryid.diagnose.gathering import (
+    Gathered,
+    Group,
+    gather,
+    leads_somewhere,
+    part,
+    with_common_sensors,
+    without_logs,
+)
 from ferryid.diagnose.inference.baselines import CampaignBaseline, HullBaseline, SimulationBaseline
 from ferryid.diagnose.inference.campaign import assemble
 from ferryid.diagnose.inference.simulation_baseline import learn_simulation
@@ -217,18 +225,27 @@ def diagnose(
     Raises
     ------
     FerryIdError
-        For input that cannot be used.
+        Where no log can be used. Those that cannot beside others are left out, and the notes name them.
     """
     settings.check()
     if not settings.each and settings.against is None:
         return distinguished(diagnose_campaign(logs, profile, settings, run))
+    profile = settings.recorded(profile)
     references = _references(logs, profile, settings, run)
+    found, errors = list[Diagnosis](), list[FerryIdError]()
+    for log in logs:
+        try:
+            found += _diagnosed(_groups([log], references, profile, settings, run), profile, settings, run)
+        except FerryIdError as error:
+            # A path that leads nowhere is a slip of the pen, no log that cannot be used.
+            if not leads_somewhere(log):
+                raise
+            errors.append(error)
+    if not found:
+        raise errors[0]
+    notes = tuple(f"Not diagnosed: {error}" for error in errors)
     return distinguished(
-        [
-            replace(diagnosis, latest=True)
-            for log in logs
-            for diagnosis in _diagnosed(_groups([log], references, profile, settings, run), profile, settings, run)
-        ]
+        [replace(one, latest=True, notes=(*notes, *one.notes), gathered=(*notes, *one.gathered)) for one in found]
     )
 
 

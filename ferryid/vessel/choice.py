@@ -163,7 +163,9 @@ def _line(profile: Profile, why: str) -> str:
 
 
 def _fitting(logs: Sequence[str]) -> VesselChoice:
-    """Return the one profile whose signals all logs have.
+    """Return the one profile whose signals all logs have, or most of them where no profile fits the others.
+
+    What becomes of the others is for the command to say: a diagnosis leaves them out, a fit refuses them with what they lack.
 
     Raises
     ------
@@ -178,19 +180,23 @@ def _fitting(logs: Sequence[str]) -> VesselChoice:
     profiles, faulty = named_profiles()
     every = [(log, [*_matches(profiles, log), *faulty]) for log in logs]
     fitting = [[one.name for one in matches if one.fits] for _, matches in every]
-    shared = [name for name in profiles if all(name in names for names in fitting)]
+    able = [names for names in fitting if names]
+    most = able if 2 * len(able) > len(logs) else fitting
+    shared = [name for name in profiles if all(name in names for names in most)]
     if len(shared) == 1:
         profile = profiles[shared[0]]
         kind = "your own" if shared[0] in user_profiles() else "bundled"
         what = "this log has" if len(logs) == 1 else "these logs have"
+        if len(most) < len(logs):
+            what = f"{len(most)} of these {len(logs)} logs have"
         return VesselChoice(profile, shared[0], _line(profile, f"{kind}, the only profile whose signals {what}"))
-    for (log, matches), names in zip(every, fitting, strict=True):
-        if not names:
-            raise FerryIdError(_none_fits(log, matches))
+    if len(most) == len(logs):
+        for (log, matches), names in zip(every, fitting, strict=True):
+            if not names:
+                raise FerryIdError(_none_fits(log, matches))
     if not shared:
-        told = "; ".join(
-            f"{log} {', '.join(names)}" for (log, _), names in list(zip(every, fitting, strict=True))[:_SHOWN]
-        )
+        several = [(log, names) for (log, _), names in zip(every, fitting, strict=True) if names]
+        told = "; ".join(f"{log} {', '.join(names)}" for log, names in several[:_SHOWN])
         raise FerryIdError(
             f"{logs[0]}: no vessel profile fits this log and the others, they fit different ones: {told}. "
             "Fix: give logs of one vessel, or use ferryid batch, which takes several vessels"

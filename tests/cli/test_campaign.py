@@ -27,6 +27,13 @@ environment = { wind = { north_mps = -3.0, east_mps = 2.0 } }
 sensors = { imu_rate_hz = 0.0, camera_rate_hz = 0.0 }
 """
 
+LADEN = """schema = "ferryid.scenario/1"
+vessel = "milliampere"
+path = { kind = "twelve-corner", dwell_s = 18, rounds = 1 }
+environment = { wind = { north_mps = 2.0, east_mps = 1.8, gust_std_mps = 0.3, gust_time_s = 8 } }
+sensors = { wind_rate_hz = 0.0, imu_rate_hz = 0.0, camera_rate_hz = 0.0 }
+payload = [{ mass_kg = 500.0, x_m = 0.5 }]
+"""
 Command = Callable[..., Run]
 
 
@@ -150,3 +157,19 @@ def test_a_reference_that_cannot_serve_is_refused(ferryid: Command, bags: list[P
     assert run.code == 2
     assert "both --against and --reference" in run.err
     assert not (tmp_path / "reports").exists()
+
+
+def test_a_load_aboard_in_all_logs_is_no_weak_thruster(ferryid: Command, tmp_path: Path) -> None:
+    """Beside a hull that comes from the same logs a load was not tried, and a thruster of 92 % named in its place."""
+    logs = []
+    for seed in (11, 12, 13):
+        logs.append(tmp_path / f"laden{seed}.mcap")
+        write_log(simulate(parse_scenario(LADEN, f"laden{seed}"), seed), logs[-1])
+    made = result(ferryid("diagnose", *logs, *VESSEL, "--out", tmp_path, "--json", "-"))
+    for one in made["logs"]:
+        named = {finding["effect"]: finding for finding in one["findings"] if finding["probability"] > 0.5}
+        assert "thruster_gain" not in named
+        assert named["payload"]["parameters"]["mass"]["low"] < 500.0 < named["payload"]["parameters"]["mass"]["high"]
+    model = json.loads(Path(made["model"]).read_text("utf-8"))
+    assert all("payload" in {effect["effect"] for effect in one["effects"]} for one in model["conditions"])
+    assert result(ferryid("evaluate", made["model"], logs[0], "--out", tmp_path, "--json", "-"))["logs"]

@@ -46,7 +46,20 @@ def test_one_bad_log_among_two_is_named(ferryid, fixtures: Path, tmp_path: Path)
     assert run.code == 0, run.err
     assert "Left out of the campaign:" in run.out
     assert "empty.mcap" in run.out
-    refused(ferryid(*words, "--each"), "empty.mcap")
+    run = ferryid(*words, "--each")
+    assert run.code == 0, run.err
+    assert f"note: Not diagnosed: {empty}" in " ".join(run.out.split())
+    refused(ferryid("diagnose", empty, "--each", "--vessel", "milliampere", "--out", tmp_path / "none"), "empty.mcap")
+    missing = ferryid(*words, tmp_path / "nowhere.mcap", "--each")
+    refused(missing, "nowhere.mcap", "no such file")
+
+
+def test_the_setting_of_the_command_counts_for_each_log(ferryid, fixtures: Path, tmp_path: Path) -> None:
+    words = ("diagnose", fixtures / "short.mcap", "--vessel", "milliampere", "--setting", "tank", "--out", tmp_path)
+    for way in ((), ("--each",)):
+        run = ferryid(*words, *way, "--json", "-")
+        assert run.code == 0, run.err
+        assert "Record further runs that excite every axis, ten minutes in all" in run.out
 
 
 @pytest.mark.slow

@@ -10,6 +10,8 @@ from ferryid.types import Floats
 
 BLOCK = 10
 """Free runs that follow each other and are drawn together: they begin seconds apart and last a minute, so that they overlap."""
+FEWEST = 2 * BLOCK
+"""Runs from which on the ratio has an interval."""
 DRAWS = 2000
 
 
@@ -22,8 +24,12 @@ class Ratio(NamedTuple):
 
     @property
     def text(self) -> str:
-        """The ratio and its interval; a ratio to runs that diverged is 0."""
-        return f"{self.value:.2f} ({self.low:.2f} to {self.high:.2f})"
+        """The ratio and its interval, where there is one; a ratio to runs that diverged is 0."""
+        return (
+            f"{self.value:.2f} ({self.low:.2f} to {self.high:.2f})"
+            if self.low <= self.high
+            else f"{self.value:.2f} (few runs)"
+        )
 
 
 def ratio_of_medians(ours: Floats, theirs: Floats) -> Ratio:
@@ -37,11 +43,10 @@ def ratio_of_medians(ours: Floats, theirs: Floats) -> Ratio:
     known = ~(np.isnan(ours) | np.isnan(theirs))
     ours, theirs = ours[known], theirs[known]
     n = len(ours)
-    if not n:
-        return Ratio(np.nan, np.nan, np.nan)
-    size = min(BLOCK, n)
-    begins = np.random.default_rng(0).integers(0, n, (DRAWS, -(-n // size)))
-    rows = ((begins[:, :, None] + np.arange(size)) % n).reshape(DRAWS, -1)[:, :n]
+    if n < FEWEST:
+        return Ratio(float(_over(np.median(ours), np.median(theirs))) if n else np.nan, np.nan, np.nan)
+    begins = np.random.default_rng(0).integers(0, n, (DRAWS, -(-n // BLOCK)))
+    rows = ((begins[:, :, None] + np.arange(BLOCK)) % n).reshape(DRAWS, -1)[:, :n]
     drawn = _over(np.median(ours[rows], axis=1), np.median(theirs[rows], axis=1))
     low, high = np.quantile(drawn, [0.025, 0.975], method="nearest")
     return Ratio(float(_over(np.median(ours), np.median(theirs))), float(low), float(high))

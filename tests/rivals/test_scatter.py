@@ -33,3 +33,10 @@ def test_diverged_runs_count_and_those_that_ended_do_not() -> None:
     assert ratio_of_medians(ours, np.array([2.0, 2.0, np.inf, 0.1])).value == 0.5
     assert ratio_of_medians(np.array([np.inf, np.inf, 1.0]), np.ones(3)).value == np.inf
     assert np.isnan(ratio_of_medians(np.array([np.nan]), np.ones(1)).value)
+
+
+def test_few_runs_have_no_interval() -> None:
+    found = ratio_of_medians(np.ones(5), np.full(5, 2.0))
+    assert found.value == 0.5
+    assert np.isnan([found.low, found.high]).all()
+    assert found.text == "0.50 (few runs)"

@@ -29,6 +29,8 @@ from ferryid.vessel.profile import Profile
 
 INSTRUMENTS = frozenset({"time_delay"})
 """What is no property of hull or actuators, and yet the same in all logs of a vessel."""
+LOADS = frozenset({"payload"})
+"""What is a log's own, and may yet be the same in all of them, or in a group of them: a load aboard."""
 WEIGHED, WORTH = 5, 0.25
 """Most candidates that are estimated in a round, and the share of the most evidence so far that a further one must promise."""
 START_SHARES = (1.0, 0.75, 0.5, 0.25)
@@ -92,7 +94,7 @@ def properties_of(campaign: Campaign) -> list[Candidate]:
     return [
         Candidate.of(one, instance, profile)
         for one in effects().values()
-        if (one.vessel or one.id in INSTRUMENTS)
+        if (one.vessel or one.id in INSTRUMENTS or (one.id in LOADS and campaign.hull.known))
         and one.choose is None
         and (campaign.hull.known or not one.of_sensor)
         and not any(one.excluded(measurements) for measurements in logs)

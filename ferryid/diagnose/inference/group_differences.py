@@ -29,6 +29,7 @@ from ferryid.diagnose.inference.campaign_estimation import CampaignFit, estimate
 from ferryid.diagnose.inference.campaign_model import DIFFERENCE_STEP, Campaign
 from ferryid.diagnose.inference.campaign_properties import (
     INSTRUMENTS,
+    LOADS,
     WEIGHED,
     properties_of,
     with_property,
@@ -44,8 +45,6 @@ from ferryid.types import Floats
 
 GROUPS = ("A", "B")
 """The logs that are named first, and those that they are compared with."""
-LOADS = frozenset({"payload"})
-"""What is a condition of a log and, as a load aboard, may be one of a group."""
 OF_HULL = frozenset({"fouling"})
 """What a single log shows beside a hull model alone, and groups beside the hull that they share."""
 ALL_THRUSTERS = "all"

@@ -53,11 +53,11 @@ def campaign_posterior(
             for one, p in zip(fit.campaign.conditions, values, strict=True)
             if one.key in here and one.key in reported
         ]
-        vessel = [
-            _stored(one, p, reported[one.key], survey)
-            for one, p in zip(fit.campaign.properties, lasting, strict=True)
-            if one.key in reported
-        ]
+        for one, p in zip(fit.campaign.properties, lasting, strict=True):
+            if one.key in reported:
+                # What was aboard in all logs may not be in the next one.
+                kind = vessel if one.effect.vessel else conditions
+                kind.append(_stored(one, p, reported[one.key], survey))
     if own is not None:
         # What all logs say of a property stands above what one of them says.
         shared = {one.key for one in vessel}

@@ -74,15 +74,19 @@ def find_split(campaign: Campaign, reference: Flags) -> Split | None:
     reference
         Which of them are references, shape (L,).
     """
-    bare = estimate_campaign(without_conditions(campaign))
-    likely = [one for one in _judged(bare, _ways(reference)) if one.likely]
-    if not likely:
+    bare = _judged(estimate_campaign(without_conditions(campaign)), _ways(reference))
+    likely = [one for one in bare if one.likely]
+    # Where a wind that nobody measured is most of the force error, another hull makes little of it.
+    hidden = [one for one in bare if one.found and one.gain.low > 0.0] if campaign.conditions else []
+    if not likely and not hidden:
         return None
-    best = max(likely, key=lambda one: one.gain.total)
+    best = max(likely or hidden, key=lambda one: one.gain.total)
     if campaign.conditions:
         # A wind or a current of one log must not look like another hull, nor hide one.
         (beside,) = _judged(estimate_campaign(campaign), [best.inside])
-        best = replace(best, gain=beside.gain)
+        if not likely and not beside.likely:
+            return None
+        best = replace(best, gain=beside.gain, ratio=best.ratio if likely else beside.ratio)
     return best if best.found else None
 
 

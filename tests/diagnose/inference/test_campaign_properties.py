@@ -283,3 +283,10 @@ def test_what_one_log_shows_of_one_actuator_is_weighed_of_that_actuator() -> Non
 
     assert asymmetries(False, False, False) == []
     assert asymmetries(False, True, False) == ["thruster1"]
+
+
+def test_a_load_may_be_aboard_in_all_logs_where_the_hull_is_known() -> None:
+    whole = campaign(CALM, conditions=())
+    for known in (True, False):
+        members = replace(whole, hull=replace(whole.hull, known=known))
+        assert ("payload" in {one.effect.id for one in properties_of(members)}) == known

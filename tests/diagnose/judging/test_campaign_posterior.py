@@ -13,6 +13,9 @@ import pytest
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.data.measurements import Survey
 from ferryid.diagnose.inference.campaign import CommonHull
+from ferryid.diagnose.inference.campaign_estimation import estimate_campaign
+from ferryid.diagnose.inference.campaign_properties import with_property
+from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.stages import AveragedLog
 from ferryid.diagnose.judging.campaign import JudgedCampaign
 from ferryid.diagnose.judging.campaign_conditions import JudgedConditions
@@ -20,8 +23,9 @@ from ferryid.diagnose.judging.campaign_posterior import campaign_posterior
 from ferryid.diagnose.judging.conclude import _with_origin
 from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.diagnose.judging.posterior import Posterior
+from ferryid.effects import effects
 from ferryid.models import Quantity, Source, StoredEffect
-from tests.diagnose.inference.test_campaign_estimation import WINDS, fitted
+from tests.diagnose.inference.test_campaign_estimation import FERRY, WINDS, fitted
 from tests.diagnose.judging.findings import found
 
 pytestmark = pytest.mark.slow
@@ -104,3 +108,18 @@ def test_a_copy_of_a_log_teaches_nothing() -> None:
     assert alone.profile == "boats/vessel.toml"
     assert copy.posterior is None
     assert copy.copy
+
+
+def test_a_load_of_all_logs_is_a_condition_of_each_and_no_property_of_the_vessel() -> None:
+    made = fitted()
+    for name, instance in (("payload", None), ("thruster_gain", "thruster1")):
+        begun = with_property(made, Candidate.of(effects()[name], instance, FERRY))
+        made = estimate_campaign(begun.campaign, begin=begun)
+    place = {f"log{i}": i for i in range(len(WINDS))}
+    together = JudgedCampaign(JudgedConditions(CommonHull(made, place), ()), ())
+    aboard = replace(found("payload"), parameters={"mass": Estimate(500.0, 400.0, 600.0, "kg")})
+    learned = campaign_posterior(together, "log1", None, [aboard, found("thruster_gain")], survey())
+    assert learned is not None
+    assert [one.effect for one in learned.conditions] == ["payload"]
+    assert [one.effect for one in learned.vessel] == ["thruster_gain"]
+    assert learned.conditions[0].parameters["mass"].value == 500.0

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.inference.campaign_model import Campaign, Member
-from ferryid.diagnose.judging.campaign_split import find_split
+from ferryid.diagnose.judging import campaign_split
+from ferryid.diagnose.judging.campaign_evidence import Gain
+from ferryid.diagnose.judging.campaign_split import Split, find_split
 from tests.diagnose.inference.test_campaign_estimation import CALM, WINDS, campaign
 
 pytestmark = pytest.mark.slow
@@ -42,3 +44,19 @@ def test_references_of_another_vessel_are_found() -> None:
     split = find_split(Campaign((*members[:2], *other), campaign().hull), np.array([False, False, True, True]))
     assert split is not None
     assert split.inside.tolist() in ([False, False, True, True], [True, True, False, False])
+
+
+@pytest.mark.parametrize(("gain", "ratio", "found"), [(676.0, 6.5, True), (676.0, 1.5, False), (50.0, 6.5, False)])
+def test_a_hull_that_a_wind_hides_is_judged_beside_the_wind(
+    gain: float, ratio: float, found: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without any wind two hulls are far likelier, and leave nearly as much of the force error, which is the wind's."""
+    inside = np.array([False, True, True])
+    told = iter(
+        [Split(inside, Gain(392.0, 322.0, 460.0), 1.7), Split(inside, Gain(gain, 0.8 * gain, 1.2 * gain), ratio)]
+    )
+    monkeypatch.setattr(campaign_split, "_judged", lambda made, ways: [next(told)])
+    split = find_split(campaign(), NONE)
+    assert (split is not None) == found
+    if split is not None:
+        assert (split.gain.total, split.ratio) == (gain, ratio)
