@@ -115,7 +115,7 @@ def _context(result: FitOutcome, interactive: Interactive) -> dict[str, Any]:
             {"name": check.name.replace("_", " "), "holds": _HOLDS[check.passed], "reason": check.reason}
             for check in verdict.checks
         ],
-        "checks_held": f"{sum(check.passed is True for check in verdict.checks)} of {len(verdict.checks)} hold",
+        "checks_held": _held([check.passed for check in verdict.checks]),
         "warnings": result.warnings,
         "axes": AXES,
         "score_rows": _score_rows(result.scores.force),
@@ -210,6 +210,13 @@ def _context(result: FitOutcome, interactive: Interactive) -> dict[str, Any]:
         ],
         "provenance": _provenance(result),
     }
+
+
+def _held(passed: Sequence[bool | None]) -> str:
+    """Return how many conditions hold, and of how many the data say nothing."""
+    judged = [one for one in passed if one is not None]
+    unknown = len(passed) - len(judged)
+    return f"{sum(judged)} of {len(judged)} hold" + (f", {unknown} could not be judged" if unknown else "")
 
 
 def _score_rows(scores: ForceScores) -> list[dict[str, Any]]:

@@ -17,7 +17,7 @@ from ferryid.identify.settings import FitSettings
 from ferryid.models.store.versions import StoredModel
 from ferryid.report.fit_report import as_text
 from ferryid.report.headline import headline_of
-from ferryid.report.page import render
+from ferryid.report.page import _held, render
 from ferryid.types import RunContext
 from ferryid.vessel import load_profile
 
@@ -74,6 +74,11 @@ def test_verdict_comes_before_any_figure(result: FitOutcome, rendered: tuple[str
     assert page.index(headline_of(result)) < page.index("<svg")
 
 
+def test_conditions_that_the_data_say_nothing_of_are_counted_apart() -> None:
+    assert _held([True, True, None]) == "2 of 2 hold, 1 could not be judged"
+    assert _held([True, False]) == "1 of 2 hold"
+
+
 @pytest.mark.blank
 def test_a_model_that_is_not_accepted_is_told_so(result: FitOutcome) -> None:
     rejected = replace(result, acceptance=replace(result.acceptance, accepted=False))
@@ -83,12 +88,18 @@ def test_a_model_that_is_not_accepted_is_told_so(result: FitOutcome) -> None:
 def test_an_estimator_without_a_model_on_the_folds_is_said_to_be_without_one(
     result: FitOutcome, tmp_path: Path
 ) -> None:
-    scores = (EstimatorScore("weak", inf, 0.11, False), EstimatorScore("derivative", 0.063, 0.212, True))
+    scores = (
+        EstimatorScore("weak", inf, 0.11, False, possible=False),
+        EstimatorScore("derivative", 0.063, 0.212, True),
+    )
     compared = replace(result, estimators=scores)
     page = render(compared)[0]
-    assert "<td>weak</td><td>unknown, too short for it</td><td>0.110</td>" in page
+    assert "<td>weak, physically impossible</td><td>unknown, too short for it</td><td>0.110</td>" in page
     told = as_text(compared, StoredModel(tmp_path / "1.json", compared.model, current=False), None)
-    assert "model's: unknown on folds of the training rows, which are too short for it, 0.110 held out\n" in told
+    assert (
+        "model's: unknown on folds of the training rows, which are too short for it, 0.110 held out; no hull has such"
+        in told
+    )
     assert "model's: 0.063 on folds of the training rows, 0.212 held out; chosen" in told
 
 

@@ -196,11 +196,13 @@ def _judged(found: FitOutcome, without: Floats, after: Floats) -> Acceptance:
         Held-out squared prediction errors of the models without and with it, shape (3,) each.
     """
     stored = accept(without, after, "prediction")
-    reasons = [*found.acceptance.reasons]
+    # The fit's own figures are of other rows, and would stand beside these as if they were the same; where they alone speak
+    # against it, they are the reason.
+    own = found.acceptance.checks[0].reason if found.acceptance.checks else PREFIX
+    kept = [one for one in found.acceptance.reasons if own not in one or (stored.accepted and one.startswith(PREFIX))]
+    reasons = [*stored.reasons, *kept]
     folds = next((one.folds for one in found.estimators if one.chosen), 0.0)
     accepted = found.acceptance.accepted and stored.accepted and folds < 1.0
-    if found.acceptance.accepted and not stored.accepted:
-        reasons = [*stored.reasons, *reasons]
     if not folds < 1.0:
         times = f"{folds:.2f} times as large" if isfinite(folds) else "infinite"
         reasons.insert(0, f"{PREFIX}on folds of the training rows the squared prediction error with it is {times}.")

@@ -337,6 +337,8 @@ def test_which_correction_is_stored(
     assert learned.accepted == stored.accepted == (kept != "none")
     assert re.search(told, learned.says), learned.says
     assert learned.over_fit == dict.fromkeys(AXES, pytest.approx(errors[kept] / fitted))
+    # One set of figures: those of the rows on which the models were compared, not of the fit's own.
+    assert sum("On held-out data" in one for one in learned.reasons) == 1
 
 
 @dataclass(frozen=True)
