@@ -13,7 +13,7 @@ import numpy as np
 from pysindy.optimizers import STLSQ
 
 from ferryid.identify.estimation import estimate_correction
-from ferryid.identify.estimators import fold_error
+from ferryid.identify.estimators import choose_estimator
 from ferryid.identify.fit_data import Coefficients
 from ferryid.identify.log_sums import folds_by_blocks, force_free_axes, sum_log
 from ferryid.identify.model_selection import select_model
@@ -53,12 +53,12 @@ def derivative(task: Task, draws: int) -> Coefficients:
 
 
 def auto(task: Task, draws: int) -> Coefficients:
-    """Return what ``ferryid fit`` finds: by the one of its estimators that errs less on folds of the training rows."""
+    """Return what ``ferryid fit`` finds: by the possible one of its estimators that errs less on folds of the training rows."""
     data = with_best_length(weak_data(task.data))
-    components = data.components(), _derivative_components(task)
-    errors = fold_error(data, components[0]), fold_error(task.data, components[1])
-    chosen = (task.data, components[1]) if errors[1] < errors[0] else (data, components[0])
-    return estimate_correction(*chosen, draws, no_progress).coefficients
+    components = {"weak": data.components(), "derivative": _derivative_components(task)}
+    chosen, scores = choose_estimator(task.data, data, components)
+    (name,) = (one.name for one in scores if one.chosen)
+    return estimate_correction(chosen, components[name], draws, no_progress).coefficients
 
 
 def _derivative_components(task: Task) -> int:
