@@ -81,7 +81,8 @@ windows. *Position*, *heading*: median over free runs, diverged ones counted as 
 The best is bold. *ferryid auto over others*: ratio of the medians, with the interval that holds 95 % of draws of blocks of
 {BLOCK} runs that follow each other; where it holds 1, the recordings do not say which is better. Defaults of ferryid were
 chosen after looking at scores on these recordings, those of the rivals were not: take the comparison as somewhat flattering to
-ferryid.
+ferryid. AAUSHIP's recordings are not among them: nobody knows the thrust curve of its propellers, on which the scale of every
+coefficient depends, nor did they record a feedback.
 """
 
 ELSEWHERE = f"""
