@@ -13,6 +13,7 @@ from ferryid.identify.outcome import EstimatorScore
 from ferryid.identify.physical_checks import physical_checks
 from ferryid.identify.settings import FOLDS
 from ferryid.identify.split import Split
+from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.weak_data import WeakData
 from ferryid.types import Flags, Floats, no_progress
 
@@ -67,7 +68,8 @@ def choose_estimator(
 ) -> tuple[LogData, tuple[EstimatorScore, ...]]:
     """Return the data of the estimator of less error on folds of the training rows, and the scores of both.
 
-    One whose inertia or damping no hull can have gives way to one that is possible and better than the base model.
+    One whose inertia or damping no hull can have gives way to one that is possible, better than the base model, and errs little
+    more. Where it errs far more, what is impossible is the data's, and is for the acceptance to say.
 
     Parameters
     ----------
@@ -85,6 +87,9 @@ def choose_estimator(
         held_out[name] = mean_ratio(judged.mse_base, judged.mse_model)
         possible[name] = all(one.passed is not False for one in physical_checks(data, data.combined(found)))
     # The order settles what is alike.
-    chosen = min(both, key=lambda name: (not (possible[name] and errors[name] < 1.0), errors[name]))
+    least = min(both, key=lambda name: errors[name])
+    most = min(1.0, IDENTIFY.possible_error * errors[least])
+    able = [name for name in both if possible[name] and errors[name] < most]
+    chosen = min(able or [least], key=lambda name: errors[name])
     scores = tuple(EstimatorScore(name, errors[name], held_out[name], name == chosen, possible[name]) for name in both)
     return both[chosen], scores

@@ -237,6 +237,12 @@ class IdentifyThresholds:
         "most by which a prior that the data contradict is widened",
         "convention: a wider prior has no effect",
     )
+    possible_error: float = threshold(
+        1.25,
+        "of the squared error",
+        "error on folds up to which an estimator that is physically possible is preferred to one of less error that is not",
+        "convention: by so much errors scatter between folds",
+    )
     bound_level: float = threshold(
         0.05,
         "-",

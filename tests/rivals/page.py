@@ -34,7 +34,7 @@ judged on the same windows and the same starts of free runs, which none of them 
 | base model | the model in the vessel profile; where a vessel has no hull model, its rigid-body mass alone |
 | ferryid weak | `fit --estimator weak`: windows, acceleration explained, whitening, prior, bounds |
 | ferryid derivative | `fit --estimator derivative`: smoothed and differentiated, SIMPLS, inertia checked |
-| ferryid auto | `fit`: of the two that are physically possible the one that errs less on folds of the training rows |
+| ferryid auto | `fit`: the one that errs less on folds of the training rows, a possible one before an impossible one |
 | thesis | as ferryid derivative, with 12 components and the inertia as it comes out (Aurlien 2021) |
 | output error | multiple shooting, segments of {SEGMENT_S:g} s (5 m; others by Froude's law), free initial states |
 | weak SINDy | windows of the same length, pysindy's `STLSQ` by axis, threshold by cross-validation |
