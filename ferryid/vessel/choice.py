@@ -188,7 +188,7 @@ def _fitting(logs: Sequence[str]) -> VesselChoice:
         kind = "your own" if shared[0] in user_profiles() else "bundled"
         what = "this log has" if len(logs) == 1 else "these logs have"
         if len(most) < len(logs):
-            what = f"{len(most)} of these {len(logs)} logs have"
+            what = f"{len(most)} of {counted(len(logs), 'log')} have"
         return VesselChoice(profile, shared[0], _line(profile, f"{kind}, the only profile whose signals {what}"))
     if len(most) == len(logs):
         for (log, matches), names in zip(every, fitting, strict=True):

@@ -51,7 +51,7 @@ def test_a_log_that_no_profile_fits_does_not_decide_for_most_that_have_one(log: 
     foreign.write_text("time,temperature\n0,1\n1,2\n2,3\n", encoding="utf-8")
     choice = choose_vessel([log, foreign, second])
     assert choice.profile.name == "milliampere"
-    assert choice.reason == "vessel milliampere: bundled, the only profile whose signals 2 of these 3 logs have"
+    assert choice.reason == "vessel milliampere: bundled, the only profile whose signals 2 of 3 logs have"
     # Of as many that fit none it is not known whose they are.
     with pytest.raises(FerryIdError, match=r"foreign\.csv: no vessel profile fits this log"):
         choose_vessel([log, foreign])
