@@ -47,7 +47,7 @@ def inertia_checks(profile: Profile, mass: Floats) -> tuple[Check, ...]:
         possible = lowest <= share and not at_most
         if low * (1.0 + _ROUNDING) < share and not at_most:
             meaning = "it is possible"
-        elif lowest <= share <= highest and at_most:
+        elif at_most and (largest if coupled else share) <= highest:
             meaning = (
                 "it is held at that bound, and the data would have more, which no hull has: the applied force may be "
                 "too large or of the wrong sign, or the actuators were not engaged. Fix: in the profile, correct the unit and "

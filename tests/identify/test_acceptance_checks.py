@@ -62,6 +62,9 @@ def test_a_bound_is_met_in_whatever_direction_the_inertia_is_that_large() -> Non
     assert failed(checks) == {name}
     assert "5.00 with its coupling to the other axes" in next(one.reason for one in checks if one.name == name)
     assert not failed(inertia_checks(PROFILE, 0.95 * mass))
+    beyond = next(one.reason for one in inertia_checks(PROFILE, 1.1 * mass) if one.name == name)
+    assert "5.50 with its coupling" in beyond
+    assert beyond.endswith("no hull carries that much added mass.")
 
 
 def test_a_mass_matrix_has_to_be_positive_definite_however_large_its_diagonal() -> None:

@@ -71,7 +71,7 @@ def in_profile(profile: Profile, values: Mapping[str, float]) -> str:
     if signal is None:
         return ""
     x, y = signal.mount_m[0] + values["x"], signal.mount_m[1] + values["y"]
-    return f"mount_m = [{x:.2f}, {y:.2f}] in [signals.position], if it is the velocity that is the body origin's"
+    return f"mount_m = [{x:.2f}, {y:.2f}] in [signals.position] (if the velocity is that of the body origin)"
 
 
 def _place(found: Kinematics) -> tuple[Estimate, Estimate]:
