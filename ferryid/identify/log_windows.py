@@ -14,9 +14,10 @@ from ferryid.identify.rows import known_rows
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.split import block_number, purge_seconds, split_rows
 from ferryid.identify.weak_data import every_second
-from ferryid.identify.weak_rows import WeakRows, average_over_windows, window_rows
+from ferryid.identify.weak_rows import WeakRows, average_over_windows
 from ferryid.models import payload_kg, validity_ranges
 from ferryid.models.forces import compute_residual
+from ferryid.regression import window_rows
 from ferryid.regression.bases import Basis
 from ferryid.signals.complementary_filter import complementary_filter
 from ferryid.signals.track import Motion, segments

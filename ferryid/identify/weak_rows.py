@@ -19,7 +19,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from ferryid.models.forces import ACCELERATIONS, base_force, without_inputs
-from ferryid.regression import window_weights
+from ferryid.regression import window_rows, window_weights
 from ferryid.regression.bases import Basis
 from ferryid.signals.track import Motion, segments
 from ferryid.types import Flags, Floats, Ints
@@ -173,11 +173,6 @@ def row_columns(
         "heading": np.column_stack([np.cos(heading), np.sin(heading)]),
     }
     return {name: np.nan_to_num(values) for name, values in columns.items()}
-
-
-def window_rows(length_s: float, rate_hz: float) -> int:
-    """Return the number of rows of a window of a length [s]: 4 at least."""
-    return max(4, round(length_s * rate_hz))
 
 
 def to_force(gains: Floats, intercept: Floats, terms: tuple[str, ...], mass: Floats) -> tuple[Floats, Floats]:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from ferryid.regression.pca import principal_components
     from ferryid.regression.qr import QrFactor, factorise
     from ferryid.regression.simpls import Simpls, fit_simpls, total
-    from ferryid.regression.test_function import window_weights
+    from ferryid.regression.test_function import window_rows, window_weights
     from ferryid.regression.thresholds import REGRESSION
 
 __all__ = [
@@ -33,6 +33,7 @@ __all__ = [
     "singular_values",
     "total",
     "undetermined_terms",
+    "window_rows",
     "window_weights",
 ]
 
@@ -61,7 +62,10 @@ __getattr__ = import_on_demand(
             "fit_simpls",
             "total",
         ),
-        "test_function": ("window_weights",),
+        "test_function": (
+            "window_rows",
+            "window_weights",
+        ),
         "thresholds": ("REGRESSION",),
     },
 )

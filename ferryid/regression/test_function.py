@@ -17,6 +17,11 @@ import numpy as np
 from ferryid.types import Floats
 
 
+def window_rows(length_s: float, rate_hz: float) -> int:
+    """Return the number of rows of a window of a length [s]: 4 at least."""
+    return max(4, round(length_s * rate_hz))
+
+
 def window_weights(m: int, step_s: float) -> tuple[Floats, Floats, Floats]:
     """Return w = sin^4 [1/s] of integral one, w' and w'' in the middle of m rows that share a window, shape (m,) each."""
     x = (np.arange(m) + 0.5) / m

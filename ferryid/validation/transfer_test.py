@@ -14,7 +14,7 @@ from ferryid.errors import FerryIdError
 from ferryid.models import Conditions, Model, StoredEffect, force_scores, usable_rows
 from ferryid.models.prediction import FreeRun, Prediction, predict
 from ferryid.models.store import load_file
-from ferryid.regression import window_weights
+from ferryid.regression import window_rows, window_weights
 from ferryid.signals.prepare import Prepared
 from ferryid.signals.track import segments
 from ferryid.types import AXES, Floats
@@ -133,7 +133,7 @@ def window_errors(errors: Floats, rows: Rows, rate_hz: float, length_s: float) -
     ndarray
         Shape (J, 3).
     """
-    m = max(4, round(length_s * rate_hz))
+    m = window_rows(length_s, rate_hz)
     weight = window_weights(m, 1.0 / rate_hz)[0] / rate_hz
     starts = [begin for one in segments(rows) for begin in range(one.start, one.stop - m + 1, max(1, m // 2))]
     return np.array([weight @ errors[begin : begin + m] for begin in starts]).reshape(-1, 3)

@@ -322,7 +322,9 @@ def test_which_correction_is_stored(
 
     def remainder(_: Learner, base: Model) -> SimpleNamespace:
         estimators = (EstimatorScore("weak", folds, 0.5, True),)
-        outcome = SimpleNamespace(acceptance=good, logs=rows, estimators=estimators, model=models["first"])
+        # Of other rows than those on which the models are compared.
+        own = accept(np.full(3, 100.0), np.full(3, 33.0), "prediction")
+        outcome = SimpleNamespace(acceptance=own, logs=rows, estimators=estimators, model=models["first"])
         return SimpleNamespace(model=models["first" if base.hull else "second"], outcome=Outcome(**vars(outcome)))
 
     def measured(_: Learner, several: Sequence[Model], __: object) -> list[np.ndarray]:
@@ -339,6 +341,7 @@ def test_which_correction_is_stored(
     assert learned.over_fit == dict.fromkeys(AXES, pytest.approx(errors[kept] / fitted))
     # One set of figures: those of the rows on which the models were compared, not of the fit's own.
     assert sum("On held-out data" in one for one in learned.reasons) == 1
+    assert not any("-67.0 %" in one for one in learned.reasons)
 
 
 @dataclass(frozen=True)
