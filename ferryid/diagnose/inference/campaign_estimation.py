@@ -31,6 +31,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from ferryid.diagnose.inference.campaign_model import Campaign, Spreads
 from ferryid.diagnose.inference.coloured_noise import ColouredNoise, Runs, fit_coloured_noise
+from ferryid.diagnose.inference.force_errors import mass_of
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.effects.force_model import ForceModel
 from ferryid.side_by_side import over
@@ -160,6 +161,12 @@ class CampaignFit:
     def force_model(self, i: int) -> ForceModel:
         """Return a log's force model at the estimate."""
         return self.campaign.force_model(i, self.common, self.own[i])
+
+    def whole_force_model(self, i: int) -> ForceModel:
+        """Return a log's force model at the estimate, with its steady acceleration as a force."""
+        force_model = self.force_model(i)
+        steady = mass_of(force_model.hull) @ self.own[i, -3:]
+        return replace(force_model, external=force_model.external + steady)
 
     @property
     def cost(self) -> float:

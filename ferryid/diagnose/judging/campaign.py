@@ -11,7 +11,6 @@ from ferryid.diagnose.inference.campaign_estimation import CampaignFit, bare_cam
 from ferryid.diagnose.inference.campaign_model import Campaign
 from ferryid.diagnose.inference.campaign_properties import properties_of
 from ferryid.diagnose.inference.estimation import Candidate
-from ferryid.diagnose.inference.force_errors import mass_of
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.campaign_conditions import JudgedConditions, judge_conditions, note
 from ferryid.diagnose.judging.campaign_errors import LogErrors
@@ -91,8 +90,11 @@ class JudgedCampaign:
         if i is None:
             return ()
         windows = self.hull.fit.campaign.members[i].windows
-        lasting = (one.finding(windows) for one in self.properties)
-        return (*self.conditions.claims(path), *(Claim(one, Figures("property")) for one in lasting))
+        lasting = (
+            Claim(one.finding(windows), Figures("property", beyond_feedback=one.beyond_feedback))
+            for one in self.properties
+        )
+        return (*self.conditions.claims(path), *lasting)
 
     def errors(self, path: str, findings: Sequence[Finding]) -> LogErrors | None:
         """Return the held-out errors of a log without and with what is confirmed over all logs; None where it shows none of it.
@@ -110,13 +112,7 @@ class JudgedCampaign:
         i = self.hull.place.get(path)
         if i is None or self.bare is None:
             return None
-        return _whole(self.bare, i), _whole(self.hull.fit, i)
-
-
-def _whole(made: CampaignFit, i: int) -> ForceModel:
-    """Return a log's force model at an estimate, with its steady acceleration as a force."""
-    force_model = made.force_model(i)
-    return replace(force_model, external=force_model.external + mass_of(force_model.hull) @ made.own[i, -3:])
+        return self.bare.whole_force_model(i), self.hull.fit.whole_force_model(i)
 
 
 def judge_campaign(campaign: Campaign, place: Mapping[str, int], progress: Callable[[str], None]) -> JudgedCampaign:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from math import exp
+from math import exp, inf
 
 import numpy as np
 
@@ -14,7 +14,9 @@ from ferryid.diagnose.inference.campaign_estimation import CampaignFit
 from ferryid.diagnose.inference.campaign_model import Campaign
 from ferryid.diagnose.inference.campaign_properties import TriedProperty, select_properties, without_property
 from ferryid.diagnose.inference.estimation import Candidate
+from ferryid.diagnose.inference.feedback import OUT_OF_STEP, Feedback, feedback_beside, joined
 from ferryid.diagnose.inference.force_errors import mass_of
+from ferryid.diagnose.inference.group_differences import compare_estimated, scatter_shows
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.campaign_evidence import Gain, held_out_loss
@@ -23,7 +25,24 @@ from ferryid.diagnose.judging.experiment_design import manoeuvre
 from ferryid.diagnose.judging.finding import Finding, Rival
 from ferryid.diagnose.judging.rivals import same_curve
 from ferryid.diagnose.judging.thresholds import JUDGING
+from ferryid.side_by_side import over
 from ferryid.types import AXES, Floats
+
+
+@dataclass(frozen=True)
+class OutOfStep:
+    """What else could put force and motion out of step in the logs of a campaign.
+
+    Attributes
+    ----------
+    evidence
+        For the delay or lag over none, beside one of each log that scatters between them [nat]; minus infinity of two logs.
+    feedback
+        What the forces tell of the disturbances, in all logs together.
+    """
+
+    evidence: float
+    feedback: Feedback
 
 
 @dataclass(frozen=True)
@@ -50,6 +69,8 @@ class PropertyTest:
         Ids of other shapes of the same thrust curve that explain nearly as much: formulas of shapes are idealised.
     credibility
         Why it cannot be true of the vessel, or would not be felt, as the end of a sentence; empty where neither is so.
+    out_of_step
+        Of a delay or lag: what else could put force and motion out of step; None of other properties.
     """
 
     candidate: Candidate
@@ -61,6 +82,28 @@ class PropertyTest:
     rivals: tuple[Rival, ...]
     alike: tuple[str, ...] = ()
     credibility: str = ""
+    out_of_step: OutOfStep | None = None
+
+    @property
+    def beyond_feedback(self) -> bool:
+        """Whether it is a delay or lag that gains more than a controller's answer to disturbances could."""
+        return self.out_of_step is not None and self.gain.low > self.out_of_step.feedback.high
+
+    @property
+    def alike_in_logs(self) -> bool:
+        """Whether it is a delay or lag that neither a controller nor hull and formulas that are off can have caused.
+
+        Over windows of seconds a short delay averages out, so that it may remove little of their error. Hull and formulas that
+        are off cause a delay that scatters between logs; the evidence for this one holds beside such a scatter.
+        """
+        if self.out_of_step is None or not self.beyond_feedback:
+            return False
+        known = all(
+            not one.low <= parameter.neutral <= one.high
+            for parameter in self.candidate.parameters
+            if (one := self.estimates.get(parameter.name)) is not None
+        )
+        return known and self.out_of_step.evidence >= INFERENCE.prior_odds
 
     @property
     def doubt(self) -> str:
@@ -78,7 +121,7 @@ class PropertyTest:
         if self.improvement[worst] < -JUDGING.worsening:
             share = -100.0 * float(self.improvement[worst])
             return f"it makes the held-out squared force error in {AXES[worst]} {share:.0f} % larger"
-        if self.improvement.max() < JUDGING.least_removed:
+        if self.improvement.max() < JUDGING.least_removed and not self.alike_in_logs:
             return (
                 f"on no axis does it remove {100.0 * JUDGING.least_removed:.0f} % of the held-out squared force error"
             )
@@ -163,6 +206,15 @@ def tested(made: CampaignFit, candidate: Candidate, rivals: Sequence[TriedProper
         tuple(Rival(one.candidate.effect.id, one.candidate.instance, min(one.odds, 0.0)) for one in others),
         tuple(one.candidate.effect.id for one in others if same_curve(one.candidate, candidate, one.share)),
         _credibility(made, candidate, {one.name: at for one, at, _ in reported}),
+        _out_of_step(made, candidate, without) if effect.id in OUT_OF_STEP else None,
+    )
+
+
+def _out_of_step(made: CampaignFit, candidate: Candidate, without: CampaignFit) -> OutOfStep:
+    evidence = compare_estimated(made, candidate, without).evidence if scatter_shows(made.campaign) else -inf
+    members = enumerate(made.campaign.members)
+    return OutOfStep(
+        evidence, joined(over(lambda one: feedback_beside(one[1].windows, made.whole_force_model(one[0])), members))
     )
 
 

@@ -53,6 +53,9 @@ class Figures:
         Evidence for a disturbance in the velocities alone [nat].
     other_logs
         What the other logs of a campaign say of a law; None where there are none.
+    beyond_feedback
+        True where a delay or lag gains more on held-out data, at the lower end of the interval, than a controller's answer to
+        disturbances could, at its upper end.
     sets_in
         True where it sets in or ends within the log as an event that no hull explains, however far that is off.
     doubt
@@ -71,6 +74,7 @@ class Figures:
     power_in_velocities: float = inf
     gain_in_velocities: float = inf
     other_logs: OtherLogs | None = None
+    beyond_feedback: bool = False
     sets_in: bool = False
     doubt: str = ""
 

@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 from ferryid.counts import counted
+from ferryid.diagnose.inference.feedback import OUT_OF_STEP
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.claims import Claim, Figures, LogFigures
 from ferryid.diagnose.judging.experiment_design import CALM, HULL_FIRST, fitting
@@ -19,9 +20,6 @@ from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
 from ferryid.effects.wording import titled
 from ferryid.types import AXES
-
-OUT_OF_STEP = ("time_delay", "thruster_lag")
-"""Effects that a controller's answer to unmeasured, unsteady disturbances looks like."""
 
 
 @dataclass(frozen=True)
@@ -292,15 +290,17 @@ def drowned_axes(log: LogFigures, threshold: float) -> dict[str, float]:
 
 @rule(JUDGING.reaction_share, "of the held-out squared force error")
 def out_of_step_beside_disturbance(finding: Finding, context: Context, threshold: float) -> Outcome:
-    """Lower a delay or lag beside unmeasured disturbances, unless it removes this much on an axis.
+    """Lower a delay or lag beside unmeasured disturbances, unless it removes this much on an axis or no controller answers.
 
     A controller answers every gust some time after it has moved the vessel, so that force and motion seem to be out of step.
-    That explains little of what moves the vessel: what removes most of the error is no such thing.
+    That explains little of what moves the vessel: what removes most of the error is no such thing. Nor is what gains more than
+    the forces tell of the disturbances: see `ferryid.diagnose.inference.feedback`.
     """
     # A property of all logs removes over all of them, and is the same in each.
     removed = finding.improvement if context.own.kind == "property" else context.own.removed
     removes = max(removed.values(), default=0.0)
-    if not context.log.unsteady or finding.effect not in OUT_OF_STEP or removes >= threshold:
+    doubtful = context.log.unsteady and finding.effect in OUT_OF_STEP and not context.own.beyond_feedback
+    if not doubtful or removes >= threshold:
         return finding, ""
     here = context.log.setting
     unsteady = "waves" if here in effects()["gusts"].absent_in else "gusts"

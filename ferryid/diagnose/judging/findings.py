@@ -19,6 +19,7 @@ from ferryid.diagnose.inference.estimation import (
     fitted_force_model,
     starting_point,
 )
+from ferryid.diagnose.inference.feedback import OUT_OF_STEP, feedback_of
 from ferryid.diagnose.inference.folds import block_s
 from ferryid.diagnose.inference.onset_estimation import lasts_s, replace_candidate
 from ferryid.diagnose.inference.profile_likelihood import intervals
@@ -121,6 +122,9 @@ def _force_claim(
         ),
     )
     figures = _figures(problem, candidate, values, reported, proof, removed)
+    if proof is not None and candidate.effect.id in OUT_OF_STEP:
+        beyond = proof.improvement.score_low > feedback_of(problem, kept).high
+        figures = replace(figures, beyond_feedback=beyond)
     return Claim(finding, figures if hull_known else replace(figures, sets_in=sets_in(problem, kept, i)))
 
 

@@ -22,9 +22,12 @@ from ferryid.diagnose.inference.campaign_properties import (
     with_property,
 )
 from ferryid.diagnose.inference.estimation import Candidate
+from ferryid.diagnose.inference.feedback import Feedback
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging import campaign as judging
 from ferryid.diagnose.judging.campaign import judge_campaign
+from ferryid.diagnose.judging.campaign_properties import OutOfStep, PropertyTest, judge_properties
 from ferryid.effects import effects
 from ferryid.effects.actuator_force import force_limits
 from ferryid.types import no_progress
@@ -290,3 +293,72 @@ def test_a_load_may_be_aboard_in_all_logs_where_the_hull_is_known() -> None:
     for known in (True, False):
         members = replace(whole, hull=replace(whole.hull, known=known))
         assert ("payload" in {one.effect.id for one in properties_of(members)}) == known
+
+
+@cache
+def late(seconds: float) -> PropertyTest:
+    """Return what speaks for a delay in calm logs whose navigation comes so much later than the forces that are recorded."""
+    whole = campaign(CALM, conditions=())
+
+    def recorded(member: Member) -> Member:
+        t, parts = member.windows.measurements.t, member.plain.parts
+        flat = parts.reshape(len(t), -1)
+        early = np.column_stack([np.interp(t + seconds, t, one) for one in flat.T]).reshape(parts.shape)
+        return replace(member, plain=replace(member.plain, parts=early))
+
+    begun = replace(whole, members=tuple(recorded(member) for member in whole.members))
+    found = judge_properties(estimate_campaign(begun), no_progress)
+    (delay,) = (one for one in found if one.candidate.effect.id == "time_delay")
+    return delay
+
+
+def test_a_delay_that_all_logs_share_and_no_controller_makes_needs_no_share_of_the_error() -> None:
+    delay = late(0.4)
+    assert delay.estimates["seconds"].value == pytest.approx(0.4, abs=0.05)
+    assert delay.out_of_step is not None
+    assert delay.out_of_step.evidence > INFERENCE.prior_odds
+    # Forces that change by the clock tell nothing of the noise.
+    assert delay.out_of_step.feedback == Feedback(0.0, 0.0)
+    assert delay.beyond_feedback
+    small = replace(delay, improvement=np.array([0.0, 0.0, 0.04]))
+    assert small.confirmed
+    most, scattered = delay.gain.low, delay.out_of_step.evidence
+    assert scattered > INFERENCE.prior_odds
+    for other in (
+        OutOfStep(scattered, Feedback(most, 1.0)),
+        OutOfStep(0.9 * INFERENCE.prior_odds, delay.out_of_step.feedback),
+        None,
+    ):
+        doubtful = replace(small, out_of_step=other)
+        assert "on no axis does it remove 10 %" in doubtful.doubt
+    about_none = replace(delay.estimates["seconds"], low=-0.01)
+    assert not replace(small, estimates={"seconds": about_none}).confirmed
+    # What removes enough needs none of this to be confirmed, and is beside disturbances what it is here.
+    assert replace(delay, out_of_step=None, improvement=np.array([0.0, 0.0, 0.2])).confirmed
+
+
+def test_only_what_a_controllers_answer_looks_like_is_weighed_against_it() -> None:
+    made, _ = select_properties(estimate_campaign(weakened(0.8)), no_progress)
+    (gain,) = made.campaign.properties
+    assert judging.tested(made, gain, ()).out_of_step is None
+
+
+def test_two_logs_show_no_scatter_between_logs() -> None:
+    whole = campaign(CALM, conditions=())
+    lag = Candidate.of(effects()["time_delay"], None, FERRY)
+    made = estimate_campaign(replace(whole, members=whole.members[:2], properties=(lag,)))
+    found = judging.tested(made, lag, ()).out_of_step
+    assert found is not None
+    assert found.evidence == -np.inf
+
+
+def test_what_all_logs_say_of_a_delay_tells_whether_a_controller_could_have_made_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    whole = campaign(CALM, conditions=())
+    for feedback, beyond in ((Feedback(0.0, 0.0), True), (Feedback(0.0, np.inf), False)):
+        weighed = replace(late(0.4), out_of_step=OutOfStep(0.0, feedback))
+        monkeypatch.setattr(judging, "judge_properties", lambda *_, found=weighed: (found,))
+        monkeypatch.setattr(judging, "tested", lambda *_, found=weighed: found)
+        judged = judge_campaign(whole, {"0": 0, "1": 1, "2": 2}, no_progress)
+        assert [claim.figures.beyond_feedback for claim in judged.claims("1")] == [beyond]

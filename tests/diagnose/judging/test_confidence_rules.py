@@ -261,9 +261,9 @@ def test_where_noise_drowns_an_axis_all_but_sensor_errors_are_hints(kind: Kind) 
 
 @pytest.mark.parametrize(("effect", "sure"), [("thruster_lag", False), ("time_delay", False), ("payload", True)])
 def test_what_a_controllers_answer_looks_like_is_a_hint_beside_gusts(effect: str, sure: bool) -> None:
-    def context(yaw: float | None, *, unsteady: bool = True) -> Context:
+    def context(yaw: float | None, *, unsteady: bool = True, beyond: bool = False) -> Context:
         removed = {} if yaw is None else {"surge": 0.1, "yaw": yaw}
-        return Context(Figures("force", removed=removed), LogFigures(unsteady=unsteady))
+        return Context(Figures("force", removed=removed, beyond_feedback=beyond), LogFigures(unsteady=unsteady))
 
     for little in (0.49, None):
         assert stands(out_of_step_beside_disturbance, found(effect), context(little)) == sure
@@ -277,6 +277,8 @@ def test_what_a_controllers_answer_looks_like_is_a_hint_beside_gusts(effect: str
         assert (beside in lower.unresolved_with and how in str(lower.separating_manoeuvre)) != sure
     assert stands(out_of_step_beside_disturbance, found(effect), context(0.5))
     assert stands(out_of_step_beside_disturbance, found(effect), context(0.3, unsteady=False))
+    # No controller's answer gains more than the forces tell of the disturbances.
+    assert stands(out_of_step_beside_disturbance, found(effect), context(0.3, beyond=True))
 
 
 @pytest.mark.parametrize(("share", "sure"), [(0.3, False), (0.6, True)])

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.inference.estimation import EstimationProblem, fit
+from ferryid.diagnose.inference.feedback import Feedback
+from ferryid.diagnose.judging import findings
 from ferryid.diagnose.judging.backward_elimination import Elimination
 from ferryid.diagnose.judging.claims import LogFigures
 from ferryid.diagnose.judging.confidence_rules import Context, apply_rules, improves_no_claimed_axis
@@ -201,3 +203,26 @@ def test_a_motion_before_its_force_is_a_clocks() -> None:
     says = effects()["time_delay"].says
     assert says({"seconds": 0.2}, None) == "The navigation's data lag the actuators' by 0.20 s."
     assert says({"seconds": -0.09}, None).startswith("The actuators' data lag the navigation's by 0.09 s: ")
+
+
+@pytest.mark.parametrize(
+    ("effect", "most", "beyond"), [("time_delay", 9.9, True), ("time_delay", 10.0, False), ("wind", 0.0, False)]
+)
+def test_a_delay_is_weighed_against_what_the_forces_tell(
+    windy: tuple[EstimationProblem, Elimination],
+    effect: str,
+    most: float,
+    beyond: bool,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    problem, stands = windy
+    monkeypatch.setattr(findings, "feedback_of", lambda *_: Feedback(most, 0.0))
+    late = fit(problem, [candidate("time_delay")]) if effect == "time_delay" else stands.fit
+    assert stands.proof is not None
+    (proof,) = stands.proof.proofs
+    gained = replace(
+        proof, candidate=late.candidates[0], improvement=replace(proof.improvement, score=30.0, score_low=10.0)
+    )
+    stands = replace(stands, fit=late, proof=replace(stands.proof, proofs=(gained,)))
+    (claim,) = force_claims(problem, stands, problem.windows.measurements, hull_known=True)
+    assert claim.figures.beyond_feedback == beyond
