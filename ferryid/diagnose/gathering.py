@@ -126,8 +126,9 @@ def sort_out(logs: Sequence[AveragedLog], whose: str) -> tuple[list[AveragedLog]
     kept = [one for one in logs if one.path not in artificial]
     doubts = {one.path: one.screened.measured.survey.contradictions for one in kept}
     wrong = {path: " ".join(found) for path, found in doubts.items() if found}
-    # What half of the logs show is the profile's fault, and not theirs.
-    if 2 * len(wrong) >= len(kept):
+    able = [one.path for one in kept if one.path in wrong or one.screened.measured.survey.comparable]
+    # What half of the logs show that can show it is the profile's fault, and not theirs.
+    if 2 * len(wrong) >= len(able):
         return kept, notes
     notes += [
         f"Left out of the {whose}: {path}: its signals contradict each other, and those of the other logs do not. {why} "

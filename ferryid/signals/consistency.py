@@ -60,6 +60,20 @@ _SPEED_GAINS = (
 )
 
 
+def comparable(track: Track) -> bool:
+    """Return whether a log is long enough, and moves enough, that some rate of it can be compared with its pose."""
+    columns = track.columns
+    span = max(2, round(SIGNALS.gain_span_s * track.rate_hz))
+    if {"psi", "r"} <= set(columns):
+        turned = _changes("psi", np.diff(columns["psi"]), columns["r"], track, span)
+        if _enough(turned, SIGNALS.least_turn_rad):
+            return True
+    if not {"x", "y", "psi", "u", "v"} <= set(columns):
+        return False
+    way = np.hypot(np.diff(columns["x"]), np.diff(columns["y"]))
+    return _enough(_changes("x", way, np.hypot(columns["u"], columns["v"]), track, span), SIGNALS.least_way_m)
+
+
 @dataclass(frozen=True)
 class _Changes:
     """Changes of a signal of the pose and integrals of its rate over the same stretches, shape (m,), and their numbers."""
@@ -69,9 +83,14 @@ class _Changes:
     number: NDArray[np.int64]
 
 
+def _enough(seen: _Changes, least: float) -> bool:
+    """Return whether there are changes enough, and large enough, to be compared."""
+    return seen.change.size >= SIGNALS.gain_spans and bool(np.sqrt(np.mean(seen.change**2)) >= least)
+
+
 def _compare(rate: str, of: str, seen: _Changes, least: float, known: tuple[tuple[float, str], ...]) -> list[Doubt]:
     change, integral = seen.change, seen.integral
-    if change.size < SIGNALS.gain_spans or np.sqrt(np.mean(change**2)) < least or not np.any(integral):
+    if not _enough(seen, least) or not np.any(integral):
         return []
     both = float(change @ integral)
     if float(integral @ integral) < 1e-200:

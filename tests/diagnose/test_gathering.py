@@ -125,6 +125,15 @@ def test_a_log_that_contradicts_itself_is_left_out_where_most_do_not(logs: tuple
     assert sort_out([logs[0], wrong], "campaign") == ([logs[0], wrong], [])
 
 
+def test_logs_that_cannot_show_a_contradiction_do_not_count_as_agreeing(logs: tuple[AveragedLog, ...]) -> None:
+    wrong = [doubtful(one, contradictions=("The surge velocity has the wrong sign.",)) for one in logs[:2]]
+    short = [doubtful(one, comparable=False) for one in logs[2:] * 3]
+    assert len(short) > len(wrong)
+    assert sort_out([*wrong, *short], "campaign") == ([*wrong, *short], [])
+    longer = [replace(one) for one in logs[2:] * 3]
+    assert sort_out([*wrong, *longer], "campaign")[0] == longer
+
+
 def test_a_clock_that_was_not_set_is_noted(logs: tuple[AveragedLog, ...]) -> None:
     early = doubtful(logs[1], t0_ns=5_000_000_000)
     (note,) = _clocks([logs[0], early])

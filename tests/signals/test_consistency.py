@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ferryid.signals.consistency import cross_checks
+from ferryid.signals.consistency import comparable, cross_checks
 from ferryid.signals.prepare import open_track
 from ferryid.signals.track import Track
 from ferryid.vessel import load_profile
@@ -35,6 +35,21 @@ def voyage(**changes: Floats) -> Track:
 
 def test_agreeing_signals_raise_no_finding() -> None:
     assert cross_checks(voyage()) == ()
+
+
+def test_short_logs_and_logs_at_rest_can_show_no_contradiction() -> None:
+    whole = voyage()
+    assert comparable(whole)
+
+    def cut(rows: int) -> Track:
+        columns = {name: values[:rows] for name, values in whole.columns.items()}
+        return Track("short", T[:rows], 0, 20.0, columns, np.ones(rows, dtype=bool))
+
+    assert not comparable(cut(300))
+    still = {name: np.zeros(T.size) for name in whole.columns}
+    assert not comparable(voyage(**still))
+    nothing_turns = dict.fromkeys(("psi", "r"), np.zeros(T.size))
+    assert comparable(voyage(**nothing_turns))
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from ferryid.effects.measurements import actuator_forces, interpolate_gaps, rudd
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.signals.align import align
 from ferryid.signals.complementary_filter import MEAN_S, complementary_filter
+from ferryid.signals.consistency import comparable
 from ferryid.signals.data_quality import left_out_sentences, repair_sentences
 from ferryid.signals.faults import find_faults
 from ferryid.signals.prepare import doubts_of
@@ -62,6 +63,10 @@ class Survey:
         What was repaired while the log was read and aligned, as sentences.
     contradictions
         Those of the doubts by which it is certain that a signal is wrong.
+    comparable
+        False where the log is too short, or moves too little, to show any contradiction.
+    jumping
+        ``"position"`` or ``"heading"``, where it jumps too often to know which samples are wrong; else empty.
     """
 
     recording: Recording
@@ -73,6 +78,8 @@ class Survey:
     left_out: tuple[str, ...]
     repairs: tuple[str, ...] = ()
     contradictions: tuple[str, ...] = ()
+    comparable: bool = True
+    jumping: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -173,6 +180,8 @@ def read_measurements(
         said,
         repairs,
         tuple(doubt.says for doubt in track.doubts if doubt.certain),
+        comparable(track),
+        tuple(sorted({fault.signal for fault in faults.poses if not fault.left_out})),
     )
     return measurements, survey
 

@@ -1,8 +1,9 @@
 """Which logs come from a simulator and not from a vessel: by their message types, or since nothing in them is noisy.
 
-Two signs are in the numbers. A solution of equations of motion has no noise between pose and velocity. And a simulator that
-adds up its velocities step by step, as a dead reckoning does, leaves steps of the position that are the speed times one length
-of time to the last digit: no sensor measures that, so that the positions are no measurement beside the velocities.
+Three signs are in the numbers. A solution of equations of motion has no noise between pose and velocity. A simulator that adds
+up its velocities step by step, as a dead reckoning does, leaves steps of the position that are the speed times one length of
+time to the last digit: no sensor measures that, so that the positions are no measurement beside the velocities. And no vessel
+that turns moves exactly along its heading: positions that do are those of a point that cannot drift.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import numpy as np
 from ferryid.diagnose.data.thresholds import DATA
 from ferryid.effects.force_model import Measurements
 from ferryid.signals.stream import Recording, Stream
-from ferryid.types import Floats
+from ferryid.types import Floats, Ints
 
 SIMULATORS = (
     "gazebo_msgs/",
@@ -47,7 +48,48 @@ def artificial(recording: Recording) -> str:
     for topic in recording.topics:
         if topic.count and topic.type.startswith(SIMULATORS):
             return f"its topic {topic.name} holds messages of a simulator ({topic.type})"
-    return _summed(recording)
+    return _summed(recording) or _along(recording)
+
+
+def _along(recording: Recording) -> str:
+    """Return that positions move exactly along the heading; empty where they do not."""
+    place = next((one for one in recording.streams.values() if {"x", "y"} <= set(one.columns)), None)
+    turn = next((one for one in recording.streams.values() if "psi" in one.columns), None)
+    if place is None or turn is None or along_share(place, turn) < DATA.summed_share:
+        return ""
+    return (
+        "each step of its positions points along the heading to the last digit, as if no vessel drifted in a turn: they are "
+        "simulated, or one is reckoned from the other, and not measured"
+    )
+
+
+def along_share(place: Stream, turn: Stream) -> float:
+    """Return the share of steps of the position that point along a heading at about their time.
+
+    0 where the vessel hardly moves or turns, which shows nothing.
+
+    Parameters
+    ----------
+    place
+        With columns ``x`` and ``y`` [m].
+    turn
+        With a column ``psi`` [rad].
+    """
+    north, east = np.diff(place.columns["x"]), np.diff(place.columns["y"])
+    length, psi = np.hypot(north, east), turn.columns["psi"]
+    moving = np.isfinite(length) & (length > DATA.along_step * np.nanmax(length, initial=0.0))
+    known = np.isfinite(psi)
+    if np.count_nonzero(moving) < DATA.summed_steps or not known.any():
+        return 0.0
+    if np.ptp(np.unwrap(psi[known])) < DATA.along_turn_rad:
+        return 0.0
+    at: Ints = np.searchsorted(turn.time_ns, place.time_ns[1:])
+    course = np.arctan2(east, north)
+    away = np.full(len(course), np.inf)
+    for shift in range(-DATA.along_samples, DATA.along_samples + 1):
+        heading = psi[np.clip(at + shift, 0, len(psi) - 1)]
+        away = np.fmin(away, np.abs(np.sin(course - heading)))
+    return float(np.mean(away[moving] <= DATA.along_rad))
 
 
 def _summed(recording: Recording) -> str:

@@ -69,5 +69,30 @@ class DataThresholds:
         "convention: nearly all; a simulation may have been set back to its start in between",
     )
 
+    along_rad: float = threshold(
+        1e-6,
+        "rad",
+        "angle between a step of the position and the heading below which the one follows from the other",
+        "convention: far above the roundings of double precision, and far below any drift angle or sensor",
+    )
+    along_step: float = threshold(
+        1e-3,
+        "of the greatest step",
+        "length of a step above which its direction is known to the last digits",
+        "convention: a thousandth; shorter ones are of a vessel at rest",
+    )
+    along_samples: int = threshold(
+        3,
+        "samples",
+        "headings on either side of a step of the position that may belong to it",
+        "convention: senders that take turns are a sample or two apart",
+    )
+    along_turn_rad: float = threshold(
+        0.1,
+        "rad",
+        "range of the heading above which a vessel drifts in its turns",
+        "convention: six degrees; on a straight course nothing need drift",
+    )
+
 
 DATA = DataThresholds()

@@ -35,7 +35,8 @@ MIRRORED, EXCHANGED = "the heading mirrored", "another log's heading"
 class HeldOutLoss:
     """Whitened squares of held-out blocks, shape (blocks,), the log of each, and the errors of every log's windows.
 
-    The errors are accelerations along the vessel's axes, shape (J, 3) for each log.
+    The squares of a block that the rest cannot predict are NaN. The errors are accelerations along the vessel's axes, shape
+    (J, 3) for each log.
     """
 
     blocks: Floats
@@ -43,8 +44,11 @@ class HeldOutLoss:
     errors: tuple[Floats, ...]
 
     def gain(self, over: HeldOutLoss) -> Floats:
-        """Return how much log-likelihood each block gains over another hypothesis, shape (blocks,)."""
-        return 0.5 * (over.blocks - self.blocks)
+        """Return how much log-likelihood each block gains over another hypothesis, shape (blocks,).
+
+        A block that the rest cannot predict under either of them gains nothing.
+        """
+        return np.nan_to_num(0.5 * (over.blocks - self.blocks), nan=0.0)
 
 
 def interval(gains: Floats) -> tuple[float, float]:
@@ -83,6 +87,10 @@ def _log_loss(made: CampaignFit, i: int) -> tuple[Floats, Floats]:
     for block, near in held_out_blocks(windows):
         J, w = part.slopes[near].reshape(-1, C.shape[0]), part.gaps[near].ravel()
         unknown = np.eye(len(w)) - J @ C @ J.T
+        if float(np.linalg.eigvalsh(unknown)[0]) < JUDGING.least_predicted:
+            # Some combination of the parameters is known from this block alone: without it, the prior would be judged.
+            squares.append(np.nan)
+            continue
         shift = C @ (J.T @ np.linalg.solve(unknown, w))
         left = part.gaps[block] + part.slopes[block] @ shift
         squares.append(float(np.sum(left**2)))

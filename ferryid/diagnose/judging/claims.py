@@ -112,6 +112,8 @@ class LogFigures:
     hull_doubt, common_hull_doubt
         Why the hull that was refitted to the log, and the one that was fitted to all logs of a campaign, cannot be the
         vessel's, as the end of a sentence; empty where they can.
+    jumping
+        ``"position"`` or ``"heading"``, where it jumps too often to know which samples are wrong.
     """
 
     hull_known: bool = True
@@ -124,3 +126,4 @@ class LogFigures:
     setting: str = ""
     hull_doubt: str = ""
     common_hull_doubt: str = ""
+    jumping: tuple[str, ...] = ()

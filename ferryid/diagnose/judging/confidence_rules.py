@@ -18,7 +18,7 @@ from ferryid.diagnose.judging.experiment_design import CALM, HULL_FIRST, fitting
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
-from ferryid.effects.wording import titled
+from ferryid.effects.wording import listed, titled
 from ferryid.types import AXES
 
 
@@ -288,6 +288,13 @@ def drowned_axes(log: LogFigures, threshold: float) -> dict[str, float]:
     return {axis: share for axis, share in log.velocity_noise.items() if share > threshold}
 
 
+@rule()
+def pose_jumps(finding: Finding, context: Context, _threshold: float) -> Outcome:
+    """Lower all findings on forces where a position or heading jumps so often that false samples are among those used."""
+    judged = context.own.kind not in ("sensor", "condition", "property")
+    return (lowered(finding) if context.log.jumping and judged else finding), ""
+
+
 @rule(JUDGING.reaction_share, "of the held-out squared force error")
 def out_of_step_beside_disturbance(finding: Finding, context: Context, threshold: float) -> Outcome:
     """Lower a delay or lag beside unmeasured disturbances, unless it removes this much on an axis or no controller answers.
@@ -372,6 +379,7 @@ RULES: tuple[ConfidenceRule, ...] = (
     hull_from_this_log,
     about_nothing_sure,
     noise_drowns_an_axis,
+    pose_jumps,
     out_of_step_beside_disturbance,
     absent_in_other_logs,
     not_of_all_logs,
@@ -417,5 +425,10 @@ def log_notes(log: LogFigures) -> list[str]:
         notes.append(
             f"The noise of the velocity, times damping, is {shares}: all that is found of forces is a hint. "
             "Record larger motions, or a velocity with less noise."
+        )
+    if log.jumping:
+        notes.append(
+            f"The {listed(log.jumping)} {'jumps' if len(log.jumping) == 1 else 'jump'} farther than the vessel can move, too "
+            "often to leave it out: such jumps look like forces, and all that is found of forces is a hint."
         )
     return notes

@@ -89,6 +89,7 @@ def _judged(
         baseline_sensors=baseline.sensors,
         setting=measurements.profile.setting,
         hull_doubt=refitted_hull(problem, stands.fit, known=baseline.hull_known).doubt,
+        jumping=log.estimated.averaged.screened.measured.survey.jumping,
     )
     return JudgedLog(log, base, stands, unknown, claims, figures)
 

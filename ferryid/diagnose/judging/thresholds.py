@@ -166,6 +166,12 @@ class JudgingThresholds:
         "most that a placebo may have besides what it imitates of a condition that acts",
         "convention: a quarter, where a true condition leaves nothing, and a guessed hull that is off as much as for itself",
     )
+    least_predicted: float = threshold(
+        1e-3,
+        "of the variance",
+        "what the noise is of a held-out block's prediction error, below which the other blocks do not predict it",
+        "convention: errors thirty times the noise; on recordings that were tried it is 4e-3 and more",
+    )
     placebo_imitated: float = threshold(
         0.67,
         "of what a condition explains",

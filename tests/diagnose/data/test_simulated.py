@@ -9,7 +9,7 @@ from typing import cast
 import numpy as np
 import pytest
 
-from ferryid.diagnose.data.simulated import artificial, relative_noise, simulated, summed_share
+from ferryid.diagnose.data.simulated import along_share, artificial, relative_noise, simulated, summed_share
 from ferryid.effects.force_model import Measurements
 from ferryid.ingest.clocks import ClockReport
 from ferryid.ingest.log import Topic
@@ -87,6 +87,34 @@ def test_positions_that_are_added_up_from_velocities_are_no_measurement() -> Non
     assert "each step of its positions is the speed of /state times one length of time" in why
     assert "the sway velocity is zero throughout" in why
     assert artificial(recording(reckoned(away_m=1e-4))) == ""
+
+
+def heading(away_rad: float = 0.0, rate: float = 0.3) -> Stream:
+    """Return the heading of `reckoned`, on a topic of its own and a little later, with some noise."""
+    t = np.arange(600) * 0.05 + 0.003
+    psi = rate * (t - 0.003) + away_rad * np.random.default_rng(2).standard_normal(len(t))
+    none = cast("ClockReport", None)
+    return Stream("/turn", np.round(t * 1e9).astype(np.int64), {"psi": psi}, none, np.zeros(len(t), dtype=np.int64))
+
+
+def placed(away_m: float = 0.0) -> Stream:
+    """Return `reckoned` with the positions alone."""
+    full = reckoned(away_m, jumps=3)
+    return replace(full, columns={name: full.columns[name] for name in ("x", "y")})
+
+
+def test_positions_exactly_along_the_heading_are_no_measurement() -> None:
+    def of(place: Stream, turn: Stream) -> str:
+        return artificial(cast("Recording", SimpleNamespace(topics=(), streams={"/state": place, "/turn": turn})))
+
+    assert "points along the heading to the last digit" in of(placed(), heading())
+    assert of(placed(away_m=1e-4), heading()) == ""
+    assert of(placed(), heading(away_rad=0.01)) == ""
+
+
+def test_a_straight_course_along_the_heading_shows_nothing() -> None:
+    straight = replace(placed(), columns={"x": np.arange(600) * 0.1, "y": np.zeros(600)})
+    assert along_share(straight, heading(rate=0.0)) == 0.0
 
 
 def test_steps_of_a_constant_speed_show_nothing() -> None:

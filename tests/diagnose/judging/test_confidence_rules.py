@@ -30,6 +30,7 @@ from ferryid.diagnose.judging.confidence_rules import (
     out_of_step_beside_disturbance,
     passes_by_little,
     place_visited_once,
+    pose_jumps,
     removes_little,
     too_brief,
     unexplained_shares,
@@ -57,7 +58,7 @@ def on(kind: Kind, **figures: object) -> Context:
 
 def test_every_rule_has_a_name_a_line_and_its_unit() -> None:
     names = [one.name for one in RULES]
-    assert len(names) == len(set(names)) == 19
+    assert len(names) == len(set(names)) == 20
     for one in RULES:
         assert one.about.endswith((".", ":", ",")) or one.about, one.name
         assert (one.threshold is None) == (one.unit == ""), one.name
@@ -257,6 +258,15 @@ def test_where_noise_drowns_an_axis_all_but_sensor_errors_are_hints(kind: Kind) 
         sure = stands(noise_drowns_an_axis, found("wind"), Context(Figures(kind), figures))
         assert sure == (not drowned or kind == "sensor")
         assert bool(log_notes(figures)) == drowned
+
+
+@pytest.mark.parametrize("kind", ["force", "unsteady", "sensor", "condition", "property"])
+def test_where_a_pose_jumps_too_often_forces_are_hints(kind: Kind) -> None:
+    figures = LogFigures(jumping=("position",))
+    assert stands(pose_jumps, found("payload"), Context(Figures(kind), LogFigures()))
+    assert stands(pose_jumps, found("payload"), Context(Figures(kind), figures)) == (kind not in ("force", "unsteady"))
+    (note,) = log_notes(figures)
+    assert note.startswith("The position jumps farther than the vessel can move, too often")
 
 
 @pytest.mark.parametrize(("effect", "sure"), [("thruster_lag", False), ("time_delay", False), ("payload", True)])
