@@ -26,7 +26,7 @@ from ferryid.types import AXES, IN_MEMORY, RunContext
 from ferryid.vessel import load_profile
 from ferryid.vessel.profile import Profile
 from tests.evidence import stamp
-from tests.real import esso, groups, instruments, withheld
+from tests.real import aauship, esso, groups, instruments, withheld
 from tests.real.places import DATA, REPORTS
 
 ENVIRONMENT = ("wind", "current", "waves", "mooring", "gusts", "shallow_water")
@@ -59,6 +59,8 @@ def write() -> None:
         parts.append(section(study, title))
     print("KVLCC2, VTec", flush=True)
     parts += [tank(), pool()]
+    print("AAUSHIP", flush=True)
+    parts.append(aauship.section())
     print("Groups of logs, other instruments", flush=True)
     others = instruments.sources()
     parts += [groups.section(), instruments.section(others)]
