@@ -33,19 +33,24 @@ SHOWN_OVERLAPS = 3
 
 @dataclass(frozen=True)
 class Gathered:
-    """Logs that can be used, measured, screened and averaged, and sentences on the others and on all."""
+    """Logs that can be used, measured, screened and averaged, and sentences on the others and on all.
+
+    `copies` are logs that are left out since they hold the motion of another: their paths and that of the other.
+    """
 
     logs: tuple[AveragedLog, ...]
     notes: tuple[str, ...] = ()
+    copies: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True)
 class Group:
-    """Logs with one hull, the references that bring it too, and what a reader must know of them."""
+    """Logs with one hull, the references that bring it too, what a reader must know of them, and the campaign's copies."""
 
     logs: tuple[AveragedLog, ...]
     references: tuple[AveragedLog, ...] = ()
     notes: tuple[str, ...] = ()
+    copies: tuple[tuple[str, str], ...] = ()
 
 
 def gather(
@@ -90,7 +95,19 @@ def gather(
         for path, error in errors.items()
     ]
     kept, why = sort_out(found, whose)
-    return Gathered(tuple(kept), (*notes, *why, *_clocks(kept)))
+    copies = tuple(repeated(kept))
+    again = {path for path, _ in copies}
+    kept = [one for one in kept if one.path not in again]
+    why += [_copied(path, other, whose) for path, other in copies]
+    return Gathered(tuple(kept), (*notes, *why, *_clocks(kept)), copies)
+
+
+def _copied(path: str, other: str, whose: str) -> str:
+    """Return that a log is another's copy and no evidence of its own, as a sentence."""
+    return (
+        f"Left out of the {whose}: {path}: it holds the motion of {Path(other).name}, as the same recording does under another "
+        "name or in another format: it is no further evidence, and no estimate has it twice"
+    )
 
 
 def leads_somewhere(path: str) -> bool:
@@ -160,11 +177,10 @@ def _unset(paths: Sequence[str]) -> tuple[str, ...]:
 
 def _overlapping(logs: Sequence[AveragedLog]) -> tuple[str, ...]:
     """Return a sentence on logs whose times overlap."""
-    copies = {path for path, _ in repeated(logs)}
     spans = sorted(
         (start, start + round(_seconds(one) * 1e9), one.path)
         for one in logs
-        if one.path not in copies and (start := _start_ns(one)) >= CLOCK_SET_NS
+        if (start := _start_ns(one)) >= CLOCK_SET_NS
     )
     overlapping = []
     for k, (_, end, path) in enumerate(spans):
@@ -201,7 +217,7 @@ def without_logs(references: Gathered, logs: Sequence[AveragedLog]) -> Gathered:
         path = references.logs[0].path
         raise FerryIdError(f"--reference: {path}: {wrong[path]}. Fix: give other recordings of the vessel")
     notes = tuple(f"Left out of the references: {path}: {why}." for path, why in wrong.items())
-    return Gathered(kept, (*references.notes, *notes))
+    return Gathered(kept, (*references.notes, *notes), references.copies)
 
 
 def part(gathered: Gathered, references: Gathered, profile: Profile, model: Model | None) -> tuple[Group, ...]:
@@ -214,7 +230,7 @@ def part(gathered: Gathered, references: Gathered, profile: Profile, model: Mode
 
 def _parts(gathered: Gathered, references: Gathered, profile: Profile, model: Model | None) -> tuple[Group, ...]:
     """Return the same without a word on what is made of them."""
-    every = Group(gathered.logs, references.logs, (*gathered.notes, *references.notes))
+    every = Group(gathered.logs, references.logs, (*gathered.notes, *references.notes), gathered.copies)
     open_groups, closed = [every], list[Group]()
     while open_groups:
         group = open_groups.pop()
@@ -231,10 +247,10 @@ def whole(gathered: Gathered, profile: Profile, model: Model | None) -> Gathered
     """Return logs that are compared as one group, without one that no common hull fits; more of them stay, with a note."""
     groups = _parts(gathered, Gathered(()), profile, model)
     if len(groups) == 1:
-        return Gathered(groups[0].logs, groups[0].notes)
+        return Gathered(groups[0].logs, groups[0].notes, gathered.copies)
     left = {one.path for group in groups for one in group.logs}
     kept = tuple(one for one in gathered.logs if one.path in left)
-    return Gathered(kept, (*dict.fromkeys(note for group in groups for note in group.notes), STAY))
+    return Gathered(kept, (*dict.fromkeys(note for group in groups for note in group.notes), STAY), gathered.copies)
 
 
 def _in_time(logs: Sequence[AveragedLog]) -> list[AveragedLog]:
@@ -293,18 +309,16 @@ def _left_out(group: Group, path: str, split: Split, others: int) -> Group:
         f"Left out of the campaign: {path}: no common hull fits it and the {counted(others, 'other log')} ({_why(split)}); "
         "another vessel, or its hull or load changed. Fix: diagnose it with --each, or with the right profile"
     )
-    copies = {one for one, other in repeated(group.logs) if other == path} | {path}
-    kept = tuple(one for one in group.logs if one.path not in copies)
+    kept = tuple(one for one in group.logs if one.path != path)
     return replace(group, logs=kept, notes=(*group.notes, note))
 
 
 def _halves(group: Group, inside: set[str], outside: set[str], split: Split) -> list[Group]:
     """Return a group in two; logs that are too short to take part go with the one that is nearest among the logs."""
-    copies = dict(repeated(group.logs))
     judged = [k for k, one in enumerate(group.logs) if one.path in inside | outside]
 
     def within(k: int) -> bool:
-        path = copies.get(group.logs[k].path, group.logs[k].path)
+        path = group.logs[k].path
         if path in inside | outside:
             return path in inside
         return group.logs[min(judged, key=lambda other: abs(other - k))].path in inside
@@ -317,7 +331,12 @@ def _halves(group: Group, inside: set[str], outside: set[str], split: Split) -> 
         "between them, or one side is of another vessel."
     )
     return [
-        Group(logs, tuple(one for one in group.references if one.path in side), (*group.notes, note))
+        replace(
+            group,
+            logs=logs,
+            references=tuple(one for one in group.references if one.path in side),
+            notes=(*group.notes, note),
+        )
         for logs, side in zip(parts, (inside, outside), strict=True)
     ]
 

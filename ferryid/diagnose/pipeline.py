@@ -137,7 +137,7 @@ def _groups(
     """Return the logs that can be used, in groups of one hull each."""
     gathered = gather(logs, profile, run, withhold=settings.withhold)
     if settings.against is not None:
-        return (Group(gathered.logs, notes=gathered.notes),)
+        return (Group(gathered.logs, notes=gathered.notes, copies=gathered.copies),)
     if references.logs:
         references = without_logs(references, gathered.logs)
     run.progress("comparing the sensors of the logs")
@@ -168,6 +168,7 @@ def _diagnosed(
             replace(
                 one,
                 latest=k == len(groups) - 1,
+                copies=group.copies,
                 sources=sources,
                 withheld=with_gains(one.withheld, gains, told=len(made) == 1),
             )
@@ -280,7 +281,7 @@ def diagnose_and_store(
     # Of a simulation no model comes.
     if settings.against is None:
         seen = without_withheld(profile, settings.withhold)
-        paths = tuple(one.path for one in found if one.latest and not one.copy)
+        paths = tuple(one.path for one in found if one.latest)
         learner = Learner(paths, seen, settings.model, run)
     # Two hulls make no model.
     latest = [one for one in found if one.latest]

@@ -102,12 +102,10 @@ def compare_groups(
         notes += [f"Group {group}: {one}" for one in found.notes]
         name_of |= {one.path: group for one in found.logs}
     for path, other in repeated(averaged):
-        if name_of[path] != name_of[other]:
-            raise FerryIdError(
-                f"{path}: holds the motion of {other}, which is in the other group. "
-                "Fix: give each recording to one side of --versus"
-            )
-        notes.append(f"Group {name_of[path]}: {path} holds the motion of {other} and counts once.")
+        raise FerryIdError(
+            f"{path}: holds the motion of {other}, which is in the other group. "
+            "Fix: give each recording to one side of --versus"
+        )
     assembled = assemble(averaged, profile, settings.model)
     if assembled is None:
         total = sum(len(one.windows.starts) for one in averaged)
@@ -128,7 +126,7 @@ def compare_groups(
         group: tuple(_group_log(one) for one in averaged if one.path in place and name_of[one.path] == group)
         for group in GROUPS
     }
-    notes += _left_out(averaged, place, name_of, {path for path, _ in repeated(averaged)})
+    notes += _left_out(averaged, place, name_of)
     notes += [*notes_of(judged, campaign), *_sensor_notes(groups)]
     return Versus(profile.name, groups, judged, tuple(notes), summary(judged), smallest_note(judged))
 
@@ -169,13 +167,9 @@ def _group_log(log: AveragedLog) -> GroupLog:
     return GroupLog(name, log.path, float(t[-1] - t[0]), len(log.windows.starts), sensors)
 
 
-def _left_out(
-    averaged: Sequence[AveragedLog], place: dict[str, int], name_of: dict[str, str], copies: set[str]
-) -> list[str]:
+def _left_out(averaged: Sequence[AveragedLog], place: dict[str, int], name_of: dict[str, str]) -> list[str]:
     return [
-        f"Group {name_of[one.path]}: {one.path} is too short and left out."
-        for one in averaged
-        if one.path not in place and one.path not in copies
+        f"Group {name_of[one.path]}: {one.path} is too short and left out." for one in averaged if one.path not in place
     ]
 
 

@@ -125,7 +125,7 @@ def _several_as_text(diagnoses: Sequence[Diagnosis]) -> str:
 
 
 def _one_as_text(one: Diagnosis) -> str:
-    lines = [f"{one.log}: {diagnosis_words.headline(one)}", *_listed(one.findings)]
+    lines = [f"{one.log}: {diagnosis_words.summary([one])}", *_listed(one.findings)]
     rows = diagnosis_errors.force_rows(one)
     if rows:
         lines += ["", f"{'on held-out data':<44}" + "".join(f"{axis:>22}" for axis in AXES)]

@@ -133,14 +133,16 @@ def estimate(one: Estimate) -> str:
     width, digits = one.high - one.low, digits_of(one)
     unit = "" if one.unit in ("-", "") else f" {one.unit}"
     value = f"{one.value:.{digits}f}{unit}"
-    if not isfinite(width):
+    if not isfinite(width) or width == 0.0:
         return value
     return f"{value} ({one.low:.{digits}f} to {one.high:.{digits}f})"
 
 
 def digits_of(one: Estimate) -> int:
-    """Return the decimals of a value that its interval supports."""
+    """Return the decimals of a value that its interval supports; a whole number that is counted has none."""
     width = one.high - one.low
+    if width == 0.0 and float(one.value).is_integer():
+        return 0
     return min(max(1 - _exponent(width), 0), 6) if isfinite(width) and width > 0.0 else 3
 
 
@@ -299,7 +301,7 @@ def model_of_all(diagnoses: Sequence[Diagnosis]) -> str:
 def summary(diagnoses: Sequence[Diagnosis]) -> str:
     """Return the verdict in one sentence, of one log or of several."""
     if len(diagnoses) == 1:
-        return headline(diagnoses[0])
+        return " ".join(filter(None, (headline(diagnoses[0]), copies(diagnoses))))
     counts = [
         f"{sum(one.verdict == verdict for one in diagnoses)} {verdict.replace('_', ' ')}"
         for verdict in dict.fromkeys(one.verdict for one in diagnoses)
@@ -317,7 +319,17 @@ def summary(diagnoses: Sequence[Diagnosis]) -> str:
         parts.append(f"Perhaps it {'also ' if sure else ''}left out {listed(perhaps)}.")
     if len(named) < len(every):
         parts.append("More is missing, which nothing known here explains.")
-    return " ".join(parts)
+    return " ".join(filter(None, (*parts, copies(diagnoses))))
+
+
+def copies(diagnoses: Sequence[Diagnosis]) -> str:
+    """Return which logs are copies of others and have no part in the estimate, as a sentence; empty where none is."""
+    found = dict.fromkeys(pair for one in diagnoses for pair in one.copies)
+    if not found:
+        return ""
+    told = listed([f"{PurePath(path).name} (of {PurePath(other).name})" for path, other in found])
+    are = "log is a copy and" if len(found) == 1 else "logs are copies and"
+    return f"{len(found)} further {are} left out of the estimate: {told}."
 
 
 def about_errors(diagnosis: Diagnosis) -> list[str]:
@@ -351,7 +363,7 @@ def about_errors(diagnosis: Diagnosis) -> list[str]:
 def findings_of_all(diagnoses: Sequence[Diagnosis]) -> tuple[Finding, ...]:
     """Return the findings of the vessel, not of a log: those of its sensors, and what every log has in the same words.
 
-    What has a figure of its own stays with its log.
+    What has a figure of its own stays with its log. Sure ones come first.
     """
     if len(diagnoses) < 2:
         return ()
@@ -362,7 +374,7 @@ def findings_of_all(diagnoses: Sequence[Diagnosis]) -> tuple[Finding, ...]:
         for one in diagnosis.findings
         if one.vessel or ("before" not in one.evidence and all((one.key, one.says) in shown for shown in every))
     }
-    return tuple(found.values())
+    return tuple(sorted(found.values(), key=lambda one: not one.sure))
 
 
 def where_common(diagnoses: Sequence[Diagnosis], common: Sequence[Finding]) -> str:

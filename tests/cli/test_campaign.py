@@ -107,7 +107,11 @@ def test_what_cannot_be_used_is_left_out_and_the_rest_goes_on(
     text = " ".join(run.out.split())
     assert "Left out of the campaign:" in text
     assert "foreign.csv" in text
-    assert "It holds the motion of bag1.mcap: it is the same recording, and counts once" in text
+    assert "1 further log is a copy and left out of the estimate: copy.mcap (of bag1.mcap)." in text
+    assert text.count("copy.mcap: it holds the motion of bag1.mcap, as the same recording does under another name") == 1
+    # It has no row of its own.
+    assert "Of 2 logs," in text
+    assert "copy partly" not in text
     assert "one hull for all 2: confirmed" in text
     model = json.loads((tmp_path / "models" / "milliampere" / "1.json").read_text("utf-8"))
     assert [one["name"] for one in model["training"]] == [one["log"] for one in model["conditions"]] == ["bag1", "bag2"]

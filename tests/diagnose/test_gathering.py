@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from threading import Barrier
@@ -106,6 +107,19 @@ def test_times_that_overlap_are_noted(days: list[str], tmp_path: Path) -> None:
     assert note.startswith("The times of logs overlap")
     assert "run1.mcap and late.mcap by" in note
     assert gather(days[:2], FERRY, IN_MEMORY).notes == ()
+
+
+def test_a_copy_is_left_out_with_its_line(days: list[str], tmp_path: Path) -> None:
+    copy = shutil.copy(days[0], tmp_path / "again.mcap")
+    found = gather([days[0], days[1], str(copy)], FERRY, IN_MEMORY)
+    assert [one.path for one in found.logs] == days[:2]
+    assert found.copies == ((str(copy), days[0]),)
+    (note,) = found.notes
+    assert note.startswith(
+        f"Left out of the campaign: {copy}: it holds the motion of run1.mcap, as the same recording does"
+    )
+    groups = part(found, Gathered(()), FERRY, None)
+    assert all(one.copies == found.copies for one in groups)
 
 
 def doubtful(log: AveragedLog, **changed: object) -> AveragedLog:

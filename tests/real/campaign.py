@@ -22,11 +22,11 @@ from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
 from ferryid.models.store import load
-from ferryid.types import AXES, IN_MEMORY, RunContext
+from ferryid.types import AXES, IN_MEMORY, Flags, RunContext
 from ferryid.vessel import load_profile
 from ferryid.vessel.profile import Profile
 from tests.evidence import stamp
-from tests.real import aauship, esso, groups, instruments, withheld
+from tests.real import aauship, causes, esso, groups, instruments, withheld
 from tests.real.places import DATA, REPORTS
 
 ENVIRONMENT = ("wind", "current", "waves", "mooring", "gusts", "shallow_water")
@@ -38,12 +38,13 @@ MEDIAN_DEG, STRENGTH, NEAR_DEG, NEAR_RUNS, WRONG_DEG = 10.0, (0.8, 1.2), 30.0, 6
 
 @dataclass(frozen=True)
 class Aim:
-    """What was aimed at, what came out, and whether that reaches it."""
+    """What was aimed at, what came out, whether that reaches it, and why not, as far as figures show it."""
 
     what: str
     aim: str
     figure: str
     reached: bool
+    cause: str = ""
 
 
 def write() -> None:
@@ -56,7 +57,9 @@ def write() -> None:
         print(title, flush=True)
         study = esso.study(kind)
         hidden += withheld.winds(study, title)
-        parts.append(section(study, title))
+        if kind == "random":
+            random = winds_of(study, study.of(kind))
+        parts.append(section(study, title, None if kind == "random" else random))
     print("KVLCC2, VTec", flush=True)
     parts += [tank(), pool()]
     print("AAUSHIP", flush=True)
@@ -167,12 +170,21 @@ def _sure(probability: float) -> bool:
     return probability > JUDGING.hint_probability
 
 
-def section(study: esso.Study, title: str) -> str:
-    """Return the section on one set of runs."""
+def winds_of(study: esso.Study, of: Flags) -> causes.Winds:
+    """Return the winds of some runs, shape (runs,), and how far the vessel turned in them."""
+    members = study.found.wind.fit.campaign.members
+    turns = [causes.spread_deg(one.windows.measurements.psi[one.windows.measurements.usable]) for one in members]
+    return causes.Winds(study.measured[of], study.found.winds[of], study.found.errors[of], np.array(turns)[of])
+
+
+def section(study: esso.Study, title: str, beside: causes.Winds | None = None) -> str:
+    """Return the section on one set of runs, `beside` those of the random runs by themselves."""
     lines = [f"\n## {title}\n", *wind_table(study), "", *_apart(study), "", *_tests(study), "", *_gains(study), ""]
     lines += [*_controls(study), "", "| aim | | figure | |", "|---|---|---|---|"]
-    for one in aims(study):
+    found = aims(study, beside)
+    for one in found:
         lines.append(f"| {one.what} | {one.aim} | {one.figure} | {'reached' if one.reached else '**missed**'} |")
+    lines += [f"\nMissed, {one.what}: {one.cause}" for one in found if not one.reached and one.cause]
     return "\n".join(lines)
 
 
@@ -213,8 +225,11 @@ def wind_table(study: esso.Study) -> list[str]:
     return lines
 
 
-def aims(study: esso.Study) -> list[Aim]:
-    """Return the aims that a set of runs has: those of the random runs, of the zigzags, and of every set."""
+def aims(study: esso.Study, beside: causes.Winds | None = None) -> list[Aim]:
+    """Return the aims that a set of runs has: those of the random runs, of the zigzags, and of every set.
+
+    `beside` are the winds of the random runs by themselves, with which causes are compared.
+    """
     found, made = study.found, []
     off, strength, named = found.off(study.measured), found.strength(study.measured), found.has_wind
     of = study.of("random")
@@ -230,6 +245,7 @@ def aims(study: esso.Study) -> list[Aim]:
                 f"at most {MEDIAN_DEG:.0f} deg",
                 f"{apart:.0f} deg",
                 apart <= MEDIAN_DEG,
+                causes.of_the_median(winds_of(study, of)),
             ),
             Aim("random runs: median strength", f"{low} to {high}", f"{ratio:.2f}", low <= ratio <= high),
         ]
@@ -242,11 +258,14 @@ def aims(study: esso.Study) -> list[Aim]:
                 "6 of 9",
                 f"{near.sum()} of {of.sum()}",
                 bool(near.mean() >= NEAR_RUNS),
+                causes.of_directions(winds_of(study, of), NEAR_DEG, NEAR_RUNS, beside),
             )
         )
     wrong = int(np.sum(named & (off > WRONG_DEG)))
     held = float(found.inside(study.measured).mean())
-    share = found.wind.gain.total / study.gains[esso.MEASURED].total
+    whole = study.gains[esso.MEASURED].total
+    share = found.wind.gain.total / whole
+    means = (study.gains[esso.MEAN].total / whole, study.gains[esso.MEAN + esso.SCALED].total / whole)
     made += [
         Aim(f"named, and more than {WRONG_DEG:.0f} deg off", "none", str(wrong), wrong == 0),
         Aim(
@@ -254,8 +273,15 @@ def aims(study: esso.Study) -> list[Aim]:
             f"{100.0 * HELD:.0f} % or more",
             f"{100.0 * held:.0f} %",
             held >= HELD,
+            causes.of_intervals(winds_of(study, study.of("all"))),
         ),
-        Aim("of the measured wind's held-out gain", f"{100.0 * SHARE:.0f} %", f"{100.0 * share:.0f} %", share >= SHARE),
+        Aim(
+            "of the measured wind's held-out gain",
+            f"{100.0 * SHARE:.0f} %",
+            f"{100.0 * share:.0f} %",
+            share >= SHARE,
+            causes.of_the_gain(*means, SHARE),
+        ),
     ]
     for name, one in study.controls.items():
         count = sum(bool(effects) for effects in one.named)

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.judging.diagnosis import Diagnosis, Withheld
+from ferryid.diagnose.judging.finding import Estimate
 from ferryid.diagnose.judging.hidden_gain import HiddenGain
 from ferryid.diagnose.judging.hidden_signal import with_gains
 from ferryid.report.diagnosis_page import as_text
 from ferryid.report.diagnosis_report import as_json, report
 from ferryid.report.diagnosis_timeline import timelines
-from ferryid.report.diagnosis_words import title
+from ferryid.report.diagnosis_words import estimate, title
 from tests.report.test_diagnosis import conforms, diagnosis, gain, wind
 
 SHARED = "thruster1 gives 85 % of the force that its speed promises."
@@ -120,3 +121,27 @@ def test_the_share_of_a_withheld_sensor_stands_once_for_all_logs() -> None:
     hidden = with_gains((Withheld("wind", {}, wind_N, "The wind was hidden."),), {"wind": share}, told=False)
     several = [replace(diagnosis("matched", log), withheld=hidden) for log in ("first", "second")]
     assert " ".join(as_text(several).split()).count(share.says("wind")) == 1
+
+
+def test_sure_findings_of_all_logs_stand_before_hints() -> None:
+    hint = replace(
+        gain(), onset_s=None, evidence={}, labels={}, probability=0.5, says="Perhaps it lags.", instance="other"
+    )
+    sure = replace(gain(), onset_s=None, evidence={}, labels={}, probability=0.99, says="It is weak.")
+    several = [replace(diagnosis("partly_explained", log), findings=(hint, sure)) for log in ("first", "second")]
+    text = as_text(several)
+    assert text.index(sure.says) < text.index(hint.says)
+
+
+def test_a_copy_has_its_sentence_in_the_summary() -> None:
+    several = [replace(one, copies=(("/logs/again.bag", "/logs/first.bag"),)) for one in campaign()]
+    for shown in (several, several[:1]):
+        told = " ".join(as_text(shown).split())
+        assert "1 further log is a copy and left out of the estimate: again.bag (of first.bag)." in told
+    assert "a copy" not in as_text(campaign())
+
+
+def test_a_number_without_an_interval_is_told_once() -> None:
+    assert estimate(Estimate(15.0, 15.0, 15.0, "-")) == "15"
+    assert estimate(Estimate(0.25, 0.25, 0.25, "s")) == "0.250 s"
+    assert estimate(Estimate(0.25, 0.2, 0.3, "s")) == "0.25 s (0.20 to 0.30)"

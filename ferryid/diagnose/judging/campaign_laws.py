@@ -131,6 +131,11 @@ class CampaignLaws:
         """How many logs can show the vessel's law."""
         return 0 if self.law is None else int(self.law.able.sum())
 
+    @property
+    def moves(self) -> tuple[float, ...]:
+        """What each term of the vessel's law adds to the acceleration, as a share of it, in the log where that is most."""
+        return () if self.law is None else tuple(self.law.moves.tolist())
+
     def common(self, problem: EstimationProblem, kept: Fit, folds: Folds) -> Law | None:
         """Return the vessel's law as it acts in the log, with the coefficients of the others; None where it does not show."""
         if self.law is None or not self.law.able[self.place]:

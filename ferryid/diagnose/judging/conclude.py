@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import PurePath
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,6 @@ from ferryid.counts import counted
 from ferryid.diagnose.checks import checks
 from ferryid.diagnose.checks.screening import ScreenedLog
 from ferryid.diagnose.data.estimate import Estimate
-from ferryid.diagnose.inference.campaign import repeated
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted_force_model
 from ferryid.diagnose.inference.force_errors import force_errors, mass_of
 from ferryid.diagnose.inference.stages import AveragedLog, Baseline
@@ -81,20 +79,18 @@ def conclude(
         for one in logs
     }
     noted = (*left_out, *(() if together is None else together.notes))
-    same = dict(repeated(logs))
     campaign = tuple(_lasting(claims[one.path]) for one in logs) if baseline.joint else ()
     shared = LogFigures(campaign=campaign)
     if together is not None:
         shared = replace(shared, weighed=together.weighed, common_hull_doubt=together.hull_doubt)
-    single, of_all = likeness_of_logs(judged, together, same)
+    single, of_all = likeness_of_logs(judged, together)
     found = tuple(
         _with_origin(
-            _concluded(by_path[one.path], claims[one.path], shared, (*_copied(same.get(one.path)), *noted), together)
+            _concluded(by_path[one.path], claims[one.path], shared, noted, together)
             if one.path in by_path
-            else _too_short(one, claims[one.path], baseline, shared, (*_copied(same.get(one.path)), *noted), together),
+            else _too_short(one, claims[one.path], baseline, shared, noted, together),
             one,
             together,
-            same.get(one.path),
         )
         for one in logs
     )
@@ -104,35 +100,20 @@ def conclude(
     )
 
 
-def _with_origin(
-    diagnosis: Diagnosis, log: AveragedLog, together: JudgedCampaign | None, copied: str | None
-) -> Diagnosis:
+def _with_origin(diagnosis: Diagnosis, log: AveragedLog, together: JudgedCampaign | None) -> Diagnosis:
     """Return a diagnosis with the path of its log, and with what the log teaches as one of a campaign."""
     screened = log.screened
     diagnosis = replace(
         diagnosis,
         path=log.path,
         profile=screened.measurements.profile.given_as,
-        copy=copied is not None,
         repairs=screened.measured.survey.repairs,
     )
     if together is None:
         return diagnosis
-    if copied is not None:
-        # What it teaches, the other log has taught.
-        return replace(diagnosis, posterior=None)
     survey = log.screened.measured.survey
     posterior = campaign_posterior(together, log.path, diagnosis.posterior, diagnosis.findings, survey)
     return replace(diagnosis, posterior=posterior)
-
-
-def _copied(other: str | None) -> tuple[str, ...]:
-    """Return that a log is another's copy, and has no say of its own."""
-    if other is None:
-        return ()
-    return (
-        f"It holds the motion of {PurePath(other).name}: it is the same recording, and counts once among the logs.",
-    )
 
 
 def _lasting(claims: Sequence[Claim]) -> frozenset[Key]:

@@ -120,8 +120,8 @@ class Diagnosis:
         Of the log, as it was given.
     profile
         Name or path that the vessel's profile is given by.
-    copy
-        True for a log that holds the motion of another one before it.
+    copies
+        Logs of its campaign that are left out since they hold the motion of another: their paths and that of the other.
     likeness
         How alike effects look in the log; None where it is too short.
     likeness_of_all
@@ -158,7 +158,7 @@ class Diagnosis:
     learned: Learned | None = None
     path: str = ""
     profile: str = ""
-    copy: bool = False
+    copies: tuple[tuple[str, str], ...] = ()
     likeness: Likeness | None = None
     likeness_of_all: Likeness | None = None
     repairs: tuple[str, ...] = ()

@@ -11,7 +11,7 @@ Björck and Golub (1973), Numerical methods for computing angles between linear 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import sqrt
 from typing import Any
@@ -204,7 +204,7 @@ def separation(first: Key, second: Key, setting: str = "") -> Separation:
 
 
 def likeness_of_logs(
-    judged: Sequence[JudgedLog], campaign: JudgedCampaign | None, repeated: Collection[str] = ()
+    judged: Sequence[JudgedLog], campaign: JudgedCampaign | None
 ) -> tuple[dict[str, Likeness], Likeness | None]:
     """Return how alike effects look in each of several logs, by path, and in all of them together.
 
@@ -214,16 +214,13 @@ def likeness_of_logs(
         Logs that are long enough.
     campaign
         What they say together: its hull's prior is that of all; None of logs that are no campaign, which have no such sum.
-    repeated
-        Paths of logs that hold the motion of another; they count once.
     """
     every = {one.selected.path: _responses(one) for one in judged}
     single = {path: likeness(one) for path, one in every.items()}
-    own = [one for path, one in every.items() if path not in repeated]
-    if campaign is None or not own:
+    if campaign is None or not every:
         return single, None
     spread = campaign.hull.fit.campaign.hull.spread[: len(COEFFICIENTS)]
-    return single, likeness(together(own, spread))
+    return single, likeness(together(list(every.values()), spread))
 
 
 def _responses(log: JudgedLog) -> Responses:

@@ -79,7 +79,8 @@ def find_unexplained(
     folds = folds_of(problem.windows)
     after, refitted = kept, problem
     if folds is not None and laws is not None and (common := laws.common(problem, kept, folds)) is not None:
-        shared = _lawful(common, after, measurements, f"that holds in all {counted(laws.able, 'log')} that can show it")
+        holding = f"that holds in all {counted(laws.able, 'log')} that can show it"
+        shared = _lawful(common, after, measurements, holding, laws.moves)
         claims.append(Claim(shared, Figures("law")))
         after, refitted = common.fit, common.problem
     if folds is not None and (law := select_law(refitted, after, folds)) is not None:
@@ -198,7 +199,8 @@ def _explains_more_with_a_law(problem: EstimationProblem, kept: Fit, law: Fit, f
     return ours.evidence > theirs.evidence
 
 
-def _lawful(law: Law, kept: Fit, measurements: Measurements, whose: str) -> Finding:
+def _lawful(law: Law, kept: Fit, measurements: Measurements, whose: str, moves: Sequence[float] = ()) -> Finding:
+    """Return a law as a finding; of one of all logs, `moves` are its terms' largest shares of the measured acceleration."""
     problem = law.problem
     # The hull stays as it is with the law: refitted without, it would bend to it on axes where it does not act.
     before = replace(law.fit, candidates=law.fit.candidates[:-1], values=law.fit.values[:-1])
@@ -212,6 +214,9 @@ def _lawful(law: Law, kept: Fit, measurements: Measurements, whose: str) -> Find
     size = "" if first.name == "1" else f"{first.name} [{first.unit}]" if first.unit else first.name
     regressor = (size, first.value(force_model)) if size else None
     parts = [one.says for one in terms]
+    if moves:
+        sizes = [f"{100.0 * share:.2g} % of the measured acceleration" for share in moves]
+        parts = [f"{one}, up to {size}" for one, size in zip(parts, sizes, strict=True)]
     listing = "; ".join(parts)
     return Finding(
         effect=UNKNOWN,

@@ -131,6 +131,7 @@ def test_a_law_of_all_logs_is_told_in_each_of_them_and_fitted_to_the_others() ->
         finding = claim.finding
         assert finding.sure
         assert "that holds in all 3 logs that can show it" in finding.says
+        assert finding.says.endswith(f", up to {100.0 * law.moves[0]:.2g} % of the measured acceleration.")
         assert finding.improvement["yaw"] > 0.05
         assert finding.law[0].coefficient.low < SIZE < finding.law[0].coefficient.high
 
