@@ -59,6 +59,9 @@ def as_text(study: Study) -> str:
         lines += ["", f"{SENSORS[study.best][:1].upper()}{SENSORS[study.best][1:]} would separate most."]
     elif study.with_further:
         lines += ["", "No further sensor would separate more on this trial; a manoeuvre has to."]
+    else:
+        told = "the profile maps every kind that bears on this vessel; a manoeuvre has to."
+        lines += ["", f"No further sensor would separate more: {told}"]
     return "\n".join(lines)
 
 

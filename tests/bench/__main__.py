@@ -22,7 +22,7 @@ DONE = ROOT / "build" / "bench" / "lines.jsonl"
 """Tables of a run that was ended."""
 LOGS = Path(tempfile.gettempdir()) / "ferryid-bench-logs"
 # In the order of the page; every one exposes run(quick) -> Section.
-MODULES = ("ingest", "identify", "archive", "commands", "simulate", "diagnosis", "long", "cluster")
+MODULES = ("ingest", "identify", "archive", "commands", "simulate", "diagnosis", "campaigns", "long", "cluster")
 
 
 def main() -> int:

@@ -23,8 +23,6 @@ REPEATED_S, REPEATS = 720, 3
 """Logs up to this length [s] are diagnosed so many times, and the median counts."""
 LOGS = {2: None, 7: None, 14: 20.0}
 """Logs of seven minutes in a campaign, and the goal of as many [s]."""
-BAGS, BAGS_GOAL_S = 60, 30.0
-"""Bags of twenty seconds, and their goal."""
 LINEAR = 1.1
 """Most power of the length, and of the number of logs, with which the time may grow."""
 STAGES = {
@@ -57,21 +55,18 @@ print(json.dumps({"total": found.total_tt, "stages": by_stage, "own": own[:20]})
 
 
 def run(quick: bool) -> Section:
-    """Measure diagnoses as whole processes; `quick` on a short log and four bags."""
+    """Measure diagnoses as whole processes; `quick` on a short log."""
     lengths = {240: None} if quick else LENGTHS_S
     logs = {} if quick else LOGS
-    bags = {4: None} if quick else {BAGS: BAGS_GOAL_S}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         single = {seconds: [written(folder, 0, seconds)] for seconds in lengths}
         part_s = 200 if quick else 420
         together = {count: [written(folder, 1 + k, part_s) for k in range(count)] for count in logs}
-        short = {count: [written(folder, 100 + k, 20) for k in range(count)] for count in bags}
         rows, curves = list[Row | Timed](), list[Curve]()
         for title, against, kind, goals in (
             ("{:.0f} min", "length [min]", single, lengths),
             (f"campaign of {{:.0f}} logs of {part_s / 60:.2g} min", "number of logs", together, logs),
-            ("campaign of {:.0f} bags of 20 s", "number of bags", short, bags),
         ):
             times: dict[float, float] = {}
             for number, paths in kind.items():

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 from tests.bench import __main__ as bench
-from tests.bench import yardstick
+from tests.bench import campaigns, yardstick
 from tests.bench.page import Curve, Row, Section, Timed
 
 ROWS: list[Row | Timed] = [
@@ -72,3 +72,12 @@ def test_the_page_says_how_other_work_compares_with_the_yardstick() -> None:
     assert "| ikpls, 7.2 million rows | 1.7 s | 6.8 s | 4 |" in said
     assert "0.5 (bare Python, whole process) to 4 (ikpls, 7.2 million rows)" in said
     assert "easier to reach than it was there for work of the first kind, and harder to reach than it was there" in said
+
+
+def test_memory_of_a_campaign_has_a_goal_of_its_own() -> None:
+    kept, more = (campaigns._memory("season", (300.0, much)) for much in (1_500_000_000, 2_500_000_000))
+    assert (kept.ours, kept.ratio, kept.reached) == ("1.50 GB, 300 s", 0.75, True)
+    assert more.reached is False
+    timed = campaigns._timed("18 logs", (20.0, 2_500_000_000), 60.0)
+    assert timed.row(yardstick.GOALS_S).reached is False
+    assert campaigns._timed("18 logs", (20.0, 1_500_000_000), 60.0).row(yardstick.GOALS_S).reached is True

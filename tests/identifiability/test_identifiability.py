@@ -65,6 +65,13 @@ def test_the_sensor_that_distinguishes_most_is_named_and_none_that_adds_nothing(
     assert [one["gained"] for one in as_json(found)["further"]] == [1, 0]
 
 
+def test_that_no_further_sensor_separates_more_is_said_of_every_profile() -> None:
+    trial = Trial(usual_trial(FERRY).scenario, FERRY, "A trial.")
+    gyro = assessed({(0, 1), (1, 2)}, {3}, OWN.sensors | {"yaw_rate"})
+    assert "No further sensor would separate more on this trial" in as_text(Study(trial, OWN, (("yaw_rate", gyro),)))
+    assert "No further sensor would separate more: the profile maps every kind" in as_text(Study(trial, OWN, ()))
+
+
 def test_sensors_that_a_profile_maps_and_may_map() -> None:
     assert further(FERRY) == ()
     assert further(REVOLT) == ("current", "payload")

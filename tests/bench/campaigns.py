@@ -1,0 +1,66 @@
+"""Campaigns: time of many logs and of many bags diagnosed together, and the memory of a season, as whole processes."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from tests.bench.page import Row, Section, Timed, duration
+from tests.bench.processes import whole_process
+from tests.bench.trials import VESSEL, written
+
+LARGEST_GB = 2.0
+LOGS, LOG_S, LOGS_GOAL_S = 18, 720, 60.0
+"""Logs of a campaign, the length of each [s], and the goal of all [s]."""
+BAGS, BAG_S, BAGS_GOAL_S = 60, 20, 30.0
+"""Bags of a campaign, the length of each [s], and the goal of all [s]."""
+SEASON = 100
+"""Logs of `LOG_S`, of which the memory counts."""
+
+
+def run(quick: bool) -> Section:
+    """Measure campaigns on logs that were read by nobody before; `quick` a few short ones."""
+    logs, log_s, bags, season = (2, 120, 4, 2) if quick else (LOGS, LOG_S, BAGS, SEASON)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        long = [written(folder, 1 + k, log_s) for k in range(season)]
+        short = [written(folder, 200 + k, BAG_S) for k in range(bags)]
+        some = _diagnosed(long[:logs], folder / "logs")
+        every = some if season == logs else _diagnosed(long, folder / "season")
+        of = f"{log_s / 60:.2g} min"
+        rows: list[Row | Timed] = [
+            _timed(f"campaign of {logs} logs of {of}", some, LOGS_GOAL_S),
+            _timed(f"campaign of {bags} bags of {BAG_S} s", _diagnosed(short, folder / "bags"), BAGS_GOAL_S),
+            _memory(f"campaign of {season} logs of {of}, memory", every),
+        ]
+    notes = [
+        f"`diagnose LOG...` of all together, whole processes, from the recorded logs to the report; {LARGEST_GB:g} GB of memory "
+        "are allowed in every row. Every log has a wind of its own and noise of its own."
+    ]
+    return Section("Campaigns", rows, notes)
+
+
+def _diagnosed(paths: Sequence[Path], out: Path) -> tuple[float, int]:
+    """Return time [s] and peak memory [bytes] of a diagnosis into a folder that is empty."""
+    return whole_process(("diagnose", *map(str, paths), *VESSEL, "--out", str(out)))
+
+
+def _timed(what: str, measured: tuple[float, int], goal_s: float) -> Timed:
+    took, much = measured
+    return Timed(what, took, goal_s, f", {much / 1e9:.2f} GB", otherwise=much / 1e9 <= LARGEST_GB)
+
+
+def _memory(what: str, measured: tuple[float, int]) -> Row:
+    """Return the row of a campaign whose memory has a goal and whose time has none."""
+    took, much = measured
+    share = much / 1e9 / LARGEST_GB
+    return Row(
+        what,
+        f"{much / 1e9:.2f} GB, {duration(took)}",
+        "memory allowed",
+        f"{LARGEST_GB:g} GB",
+        share,
+        "≤ 1",
+        share <= 1.0,
+    )
