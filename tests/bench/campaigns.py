@@ -35,8 +35,8 @@ def run(quick: bool) -> Section:
             _memory(f"campaign of {season} logs of {of}, memory", every),
         ]
     notes = [
-        f"`diagnose LOG...` of all together, whole processes, from the recorded logs to the report; {LARGEST_GB:g} GB of memory "
-        "are allowed in every row. Every log has a wind of its own and noise of its own."
+        f"`diagnose LOG...` of all together, whole processes, from the recorded logs to the report; {LARGEST_GB:g} GB of "
+        "memory are allowed in every row. Every log has a wind of its own and noise of its own."
     ]
     return Section("Campaigns", rows, notes)
 

@@ -213,7 +213,8 @@ def aims(results: Mapping[str, Made], logs: Sequence[str]) -> list[str]:
     told = "; ".join(f"{effect} in {_short(log)}: {why}" for (effect, log), why in defended.items() if why)
     figure = f"without one: {', '.join(missing)}" if missing else told or "nothing named"
     return [
-        f"| every finding that is named is shown by an independent signal | all | {figure} | {'**missed**' if missing else 'reached'} |",
+        f"| every finding that is named is shown by an independent signal | all | "
+        f"{figure} | {'**missed**' if missing else 'reached'} |",
         f"| the whole folder | at most {SECONDS:.0f} s | {slowest:.0f} s | "
         f"{'reached' if slowest <= SECONDS else '**missed**'} |",
     ]
