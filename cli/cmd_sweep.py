@@ -49,8 +49,12 @@ def command(
     residual: Residual = "measured",
     rate: Rate = None,
     estimator: Annotated[
-        str, typer.Option("--estimator", help="derivative, or weak: windows are then those of the weak form.")
-    ] = "derivative",
+        str,
+        typer.Option(
+            "--estimator",
+            help="derivative, or weak: windows are then those of the weak form; auto: the one that fit uses for these logs.",
+        ),
+    ] = "auto",
     weak_window: WeakWindow = None,
     inertia: Inertia = "auto",
     delta: Delta = 1.0,

@@ -7,7 +7,7 @@ A fit to an archive or to motions in memory begins with its own data and ends wi
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 import numpy as np
@@ -73,6 +73,55 @@ def fit_opened(
     opened: Sequence[Opened], profile: Profile, settings: FitSettings, run: RunContext, name: str
 ) -> FitOutcome:
     """Fit a correction of a profile's hull to logs that were read and aligned; arguments and errors as of `fit_logs`."""
+    chosen = estimator_for(opened, profile, settings, run)
+    estimate = estimate_correction(chosen.data, chosen.components, settings.draws, run.progress)
+    outcome = accept_estimate(chosen.data, estimate, name, run)
+    told = (f"The derivative's estimator was used: {chosen.why}.",) if chosen.why else ()
+    return replace(outcome, warnings=(*outcome.warnings, *told), estimators=chosen.scores)
+
+
+@dataclass(frozen=True, eq=False)
+class ChosenData:
+    """The data of the estimator that a fit uses.
+
+    Attributes
+    ----------
+    data, components
+        Its data, and its number of SIMPLS components.
+    scores
+        How well either estimator predicts, where both were compared.
+    why
+        Why the weak form, which was not ruled out, cannot be used; empty where it can.
+    """
+
+    data: LogData
+    components: int
+    scores: tuple[EstimatorScore, ...] = ()
+    why: str = ""
+
+    @property
+    def estimator(self) -> str:
+        """``"weak"`` or ``"derivative"``."""
+        return "weak" if isinstance(self.data, WeakData) else "derivative"
+
+
+def estimator_for(opened: Sequence[Opened], profile: Profile, settings: FitSettings, run: RunContext) -> ChosenData:
+    """Return the data of the estimator that a fit of these settings to these logs uses; none is fitted.
+
+    Raises
+    ------
+    FerryIdError
+        For logs that a fit refuses, with cause and remedy.
+    """
+    data, training = _prepare(opened, profile, settings, run)
+    run.progress("fitting")
+    return _choose_data(data, training, opened, run)
+
+
+def _prepare(
+    opened: Sequence[Opened], profile: Profile, settings: FitSettings, run: RunContext
+) -> tuple[LogData, Sequence[Flags]]:
+    """Return smoothed logs with their residuals, split, and the training rows with those on which something is unknown."""
     parts = None
     if settings.windows_s:
         run.progress("choosing the window")
@@ -83,9 +132,12 @@ def fit_opened(
     data = replace(data, functions=data.functions.without(still_axes(profile, data.motions)))
     if parts is None:
         parts = split_rows(data.motions, settings.split, window_s=settings.window_s)
-    data = replace(data, split=parts.within([motion.valid for motion in data.motions]))
-    run.progress("fitting")
-    kind = settings.estimator
+    return replace(data, split=parts.within([motion.valid for motion in data.motions])), parts.training
+
+
+def _choose_data(data: LogData, training: Sequence[Flags], opened: Sequence[Opened], run: RunContext) -> ChosenData:
+    """Return the data of the estimator of the settings, or for ``"auto"`` of the one that folds of the training rows favour."""
+    settings, kind = data.settings, data.settings.estimator
     weak = with_best_length(weak_data(data)) if kind != "derivative" else weak_data(data)
     why = weak.impossible if kind == "auto" else ""
     if why:
@@ -95,21 +147,16 @@ def fit_opened(
         wanted = settings.components
         if wanted == "auto":
             windows_s = (settings.window_s,)
-            wanted = _select(profile, settings, data.functions, opened, windows_s, parts.training).components
+            wanted = _select(data.profile, settings, data.functions, opened, windows_s, training).components
         components["derivative"] = int(wanted)
     if kind != "derivative":
         weak.refuse_contradictions()
         components["weak"] = weak.components()
-    chosen: LogData = data if kind == "derivative" else weak
-    compared: tuple[EstimatorScore, ...] = ()
-    if kind == "auto":
-        run.progress("comparing the estimators")
-        chosen, compared = choose_estimator(data, weak, components)
-    wanted = components["weak" if isinstance(chosen, WeakData) else "derivative"]
-    estimate = estimate_correction(chosen, wanted, settings.draws, run.progress)
-    outcome = accept_estimate(chosen, estimate, name, run)
-    told = (f"The derivative's estimator was used: {why}.",) if why else ()
-    return replace(outcome, warnings=(*outcome.warnings, *told), estimators=compared)
+    if kind != "auto":
+        return ChosenData(data if kind == "derivative" else weak, components[kind], why=why)
+    run.progress("comparing the estimators")
+    chosen, scores = choose_estimator(data, weak, components)
+    return ChosenData(chosen, components["weak" if isinstance(chosen, WeakData) else "derivative"], scores)
 
 
 def accept_estimate(data: FitData, estimate: Estimate, name: str, run: RunContext) -> FitOutcome:

@@ -20,6 +20,10 @@ EVERY = 4
 _GOLDEN = (5.0**0.5 - 1.0) / 2.0
 
 
+class TooShort(FerryIdError):
+    """Logs that are too short for what is asked of them, and may do for less."""
+
+
 @dataclass(frozen=True)
 class Split:
     """Which rows train and which validate; rows in neither are invalid or purged.
@@ -260,9 +264,9 @@ def _every_kth(motions: Sequence[Motion], every: int) -> Split:
     return Split("every-kth", tuple(training), tuple(validation), 0.0, (note,))
 
 
-def _too_short(motion: Motion, used: Flags, needed_s: float, what: str) -> FerryIdError:
+def _too_short(motion: Motion, used: Flags, needed_s: float, what: str) -> TooShort:
     seconds = np.count_nonzero(used) / motion.rate_hz
-    return FerryIdError(
+    return TooShort(
         f"{motion.log}: too short for {what}, found {seconds:.1f} s of usable rows and {needed_s:.1f} s are needed. "
         "Fix: use a longer log, a shorter smoothing window, or several logs with --split logs"
     )

@@ -100,6 +100,8 @@ def render(found: Sweep, command: Sequence[str] = (), interactive: Interactive =
         assets=interactive.assets,
         vessel=found.vessel,
         headline=headline(found),
+        estimator=found.estimator_says,
+        options=" ".join(found.fit_options),
         notes=found.notes,
         logs=[{**log, "seconds": f"{log['seconds']:.0f}"} for log in found.logs],
         sections=sections,

@@ -12,7 +12,7 @@ from ferryid.types import AXES
 
 def render_sweep(found: Sweep) -> str:
     """Return a sweep for a terminal."""
-    lines = [headline(found), ""]
+    lines = [headline(found), *([found.estimator_says] if found.estimator_says else []), fit_with(found), ""]
     for key, choice in found.by.items():
         title = f"by {BY[key]}, {counted(choice.curves.folds, 'fold')}, {counted(choice.curves.rows, found.tested)}"
         lines += [title, *(_matrix(found, choice) if found.what == "both" else _table(found, choice)), ""]
@@ -26,6 +26,11 @@ def headline(found: Sweep) -> str:
     ratio = choice.over_base[choice.window, choice.components - 1]
     told = ", ".join(f"{axis} {value:.3g}" for axis, value in zip(AXES, ratio, strict=True) if np.isfinite(value))
     return f"Choice: {choice.title}. Cross-validated {found.error} over the base model's: {told}."
+
+
+def fit_with(found: Sweep) -> str:
+    """Return the options with which a fit uses the choice."""
+    return f"Fit with: {' '.join(found.fit_options)}"
 
 
 def _table(found: Sweep, choice: Selection) -> list[str]:

@@ -180,6 +180,8 @@ def test_sweep_settings(ferryid, fixtures: Path, tmp_path: Path, what: str, wind
     assert run.code == 0, run.err
     found = conforms(run.out)
     assert set(found["by"]) == {"blocks", "logs"}
+    assert found["estimator"]["asked"] == "auto"
+    assert found["estimator"]["says"].startswith("Estimator auto: the derivative's was swept, ")
     assert len(found["windows_s"]) == windows
     for one in found["by"].values():
         tables = [*one["mse"].values(), *one["standard_error"].values(), one["score"], one["score_standard_error"]]

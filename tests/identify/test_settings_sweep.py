@@ -22,7 +22,7 @@ from tests.identify.rounds import PROFILE
 from tests.identify.trials import measured
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
-SETTINGS = FitSettings(delta=0.4, sigma=0.4)
+SETTINGS = FitSettings(delta=0.4, sigma=0.4, estimator="derivative")
 Run = Callable[..., Sweep]
 
 

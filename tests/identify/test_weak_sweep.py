@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import html
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +16,7 @@ from ferryid import api
 from ferryid.errors import FerryIdError
 from ferryid.identify import inputs
 from ferryid.identify.log_windows import average_log
+from ferryid.identify.pipeline import fit_opened
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.sweeps import weak_sweep
 from ferryid.identify.sweeps.settings_sweep import Sweep, sweep_json, sweep_settings
@@ -134,12 +137,55 @@ def test_usual_lengths_that_do_not_fit_are_left_out_and_said(run: Run) -> None:
     assert any(note.startswith("A window of 16 s was left out: the weak form needs 12 windows") for note in found.notes)
 
 
-def test_another_estimator_is_the_derivatives_as_before(run: Run) -> None:
-    log, plain = measured(1, noise=50.0), FitSettings(delta=0.4, sigma=0.4)
-    auto, derivative = (run("components", [log], replace(plain, estimator=each)) for each in ("auto", "derivative"))
-    np.testing.assert_array_equal(auto.choice.curves.mse, derivative.choice.curves.mse)
-    assert sweep_json(auto)["settings"]["estimator"] == "derivative"
-    assert sweep_json(auto)["test_window_s"] == 1.0
+@pytest.mark.slow
+@pytest.mark.parametrize(("noise", "jitter", "estimator"), [(50.0, 0.0, "derivative"), (20.0, 0.15, "weak")])
+def test_auto_sweeps_what_a_fit_uses(run: Run, opened: Opened, noise: float, jitter: float, estimator: str) -> None:
+    log, settings = measured(1, noise=noise, jitter=jitter), replace(SETTINGS, estimator="auto")
+    found = run("components", [log], settings)
+    plain = sweep_json(found)
+    fitted = fit_opened([replace(opened, measured=log)], PROFILE, replace(settings, draws=1), RUN, "fit")
+    assert fitted.model.settings["estimator"] == estimator
+    assert plain["estimator"]["asked"] == "auto"
+    assert plain["estimator"]["swept"] == plain["settings"]["estimator"] == estimator
+    assert plain["estimators"] == [one.to_json() for one in fitted.estimators]
+    assert plain["fit_options"][:2] == ["--estimator", estimator]
+    own = run("components", [log], replace(settings, estimator=estimator))
+    np.testing.assert_array_equal(found.choice.curves.mse, own.choice.curves.mse)
+    assert (own.estimator_says, own.estimators) == ("", ())
+    line = plain["estimator"]["says"]
+    assert line.startswith("Estimator auto: ")
+    assert "which a fit uses" in line
+    assert render_sweep(found).splitlines()[1:3] == [line, "Fit with: " + " ".join(plain["fit_options"])]
+    assert line in html.unescape(render(found)[0])
+
+
+@pytest.mark.parametrize(
+    ("seconds", "jitter", "settings", "options", "says"),
+    [
+        (240.0, 0.15, {}, {"windows_s": (0.5, 1.0)}, "as --windows are its smoothing windows; --estimator weak takes"),
+        (240.0, 0.15, {"residual": "commanded"}, {}, "as a fit uses it: the weak form explains the measured force"),
+        (120.0, 0.15, {}, {}, "as a fit uses it: the weak form needs 12 windows of 8 s"),
+        (30.0, 0.0, {}, {}, "as a fit cannot compare the two: .*too short for three blocks"),
+    ],
+)
+def test_auto_says_why_it_sweeps_the_derivative(
+    run: Run, seconds: float, jitter: float, settings: dict[str, Any], options: dict[str, Any], says: str
+) -> None:
+    log = measured(1, noise=20.0, jitter=jitter, seconds=seconds)
+    found = run("both" if options else "components", [log], replace(SETTINGS, estimator="auto", **settings), **options)
+    assert re.search(says, found.estimator_says)
+    assert not found.weak
+    assert found.windows_s == options.get("windows_s", (1.0,))
+
+
+def test_auto_falls_back_where_folds_are_too_short(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    log = measured(1, noise=20.0, jitter=0.15)
+    monkeypatch.setattr(weak_sweep, "_impossible", lambda *_: "too few windows")
+    found = run("components", [log], replace(SETTINGS, estimator="auto"))
+    assert found.settings.estimator == "derivative"
+    assert "cannot be cross-validated: round 1: too few windows in a fold." in found.estimator_says
+    with pytest.raises(FerryIdError, match=r"too few windows in a fold\. Fix: "):
+        run("components", [log])
 
 
 def test_folds_are_apart_and_hold_all_windows() -> None:
@@ -178,3 +224,9 @@ def test_a_sweep_of_an_archive_is_that_of_the_logs(tmp_path: Path) -> None:
     assert by_archive.logs == by_logs.logs
     report = api.sweep("components", [], PROFILE, settings, tmp_path, archive=True)
     assert report.json["choice"]["components"] == by_logs.choice.components
+    # As a fit to an archive.
+    auto = sweep_settings(
+        "components", [], PROFILE, replace(settings, estimator="auto"), RunContext(tmp_path), archive=True
+    )
+    assert not auto.weak
+    assert "as a fit to an archive uses it; --estimator weak sweeps the weak form." in auto.estimator_says

@@ -14,8 +14,11 @@ from ferryid.identify.fit_warnings import log_warnings
 from ferryid.identify.inputs import read_logs
 from ferryid.identify.log_sums import LogSums, folds_by_blocks, folds_by_logs, force_free_axes, sum_log
 from ferryid.identify.model_selection import Selection, select_model, windows_to_try
+from ferryid.identify.outcome import EstimatorScore
+from ferryid.identify.pipeline import estimator_for
 from ferryid.identify.rows import basis_for
 from ferryid.identify.settings import FOLDS, TEST_WINDOW_S, WINDOWS_S, FitSettings
+from ferryid.identify.split import TooShort
 from ferryid.identify.sweeps.weak_sweep import sweep_weak
 from ferryid.regression.bases import Basis
 from ferryid.regression.cross_validation import Folds
@@ -50,6 +53,9 @@ class Sweep:
         What a reader must know, as sentences.
     test_window_s
         Smoothing window of the test rows [s], or in the weak form the length of the windows that are tested in.
+    asked, estimator_says, estimators
+        The estimator that was asked for; of ``"auto"`` a sentence that says which one was swept and why, and how well either
+        predicts, where both were compared.
     """
 
     what: str
@@ -60,6 +66,9 @@ class Sweep:
     by: Mapping[str, Selection]
     notes: tuple[str, ...]
     test_window_s: float = TEST_WINDOW_S
+    asked: str = "derivative"
+    estimator_says: str = ""
+    estimators: tuple[EstimatorScore, ...] = ()
 
     @property
     def weak(self) -> bool:
@@ -81,6 +90,15 @@ class Sweep:
         """What to fit with: the choice by stretches, which every set of logs has."""
         return self.by["blocks"]
 
+    @property
+    def fit_options(self) -> tuple[str, ...]:
+        """Options with which ``ferryid fit`` uses the choice."""
+        window = "--weak-window" if self.weak else "--window"
+        return (
+            "--estimator", self.settings.estimator, window, f"{self.choice.window_s:g}",
+            "--components", str(self.choice.components),
+        )  # fmt: skip
+
 
 def sweep_settings(
     what: str,
@@ -95,7 +113,9 @@ def sweep_settings(
 ) -> Sweep:
     """Cross-validate logs over windows and component counts of one estimator.
 
-    The derivative's, unless the settings say ``"weak"``; windows are then those of the weak form.
+    For ``"auto"`` that which a fit to these logs uses. Of an archive it is the derivative's, as of a fit; with `windows_s` too,
+    as these are smoothing windows unless the weak form was asked for, and where the logs are too short for the weak form in
+    every fold.
 
     Parameters
     ----------
@@ -126,28 +146,93 @@ def sweep_settings(
             f"{', '.join(KINDS)} or basis"
         )
     check_folds(folds)
-    weak = settings.estimator == "weak"
     if what == "components" and windows_s:
-        raise FerryIdError(
-            f"--windows: components are swept at one window. Fix: give --{'weak-' if weak else ''}window, or sweep both"
+        option = "--weak-window" if settings.estimator == "weak" else "--window"
+        raise FerryIdError(f"--windows: components are swept at one window. Fix: give {option}, or sweep both")
+    asked, settings = settings.estimator, replace(settings, windows_s=()).on(profile)
+    if what != "window":
+        settings = replace(settings, components="auto")
+    opened = () if archive else tuple(read_logs(logs, profile, settings, run))
+    request = _Request(what, tuple(logs), opened, profile, settings, run, tuple(windows_s), folds, archive)
+    kind, says, scores = (asked, "", ()) if asked != "auto" else _as_a_fit(request)
+    if kind == "weak":
+        try:
+            found = _sweep_weak(request.of("weak"))
+        except TooShort as error:
+            if asked != "auto":
+                raise
+            told = f"as the weak form, which a fit uses, cannot be cross-validated: {_cause(error)}."
+            says = f"Estimator auto: the derivative's was swept, {told}"
+            found = _sweep_derivative(request.of("derivative"))
+    else:
+        found = _sweep_derivative(request.of("derivative"))
+    return replace(found, asked=asked, estimator_says=says, estimators=scores)
+
+
+@dataclass(frozen=True, eq=False)
+class _Request:
+    """What is to be swept: the arguments of `sweep_settings`, and the logs that were read, none of an archive."""
+
+    what: str
+    logs: tuple[str, ...]
+    opened: tuple[Opened, ...]
+    profile: Profile
+    settings: FitSettings
+    run: RunContext
+    windows_s: tuple[float, ...]
+    folds: int
+    archive: bool
+
+    def of(self, estimator: str) -> _Request:
+        """Return the same for one estimator."""
+        return replace(self, settings=replace(self.settings, estimator=estimator))
+
+
+def _as_a_fit(request: _Request) -> tuple[str, str, tuple[EstimatorScore, ...]]:
+    """Return the estimator that a fit to the logs uses, a sentence that says so and why, and how well either predicts."""
+    derivative = "Estimator auto: the derivative's was swept"
+    if request.archive:
+        return "derivative", f"{derivative}, as a fit to an archive uses it; --estimator weak sweeps the weak form.", ()
+    if request.windows_s:
+        told = (
+            "as --windows are its smoothing windows; --estimator weak takes them as lengths of the weak form's windows."
         )
-    if what != "components" and settings.smoother == "kalman" and not weak:
+        return "derivative", f"{derivative}, {told}", ()
+    try:
+        chosen = estimator_for(request.opened, request.profile, request.settings, request.run)
+    except TooShort as error:
+        return "derivative", f"{derivative}, as a fit cannot compare the two: {_cause(error)}.", ()
+    if chosen.why:
+        return "derivative", f"{derivative}, as a fit uses it: {chosen.why}.", ()
+    told = ", ".join(f"{one.name} {one.folds:.3g}" for one in chosen.scores)
+    name = "the weak form" if chosen.estimator == "weak" else "the derivative's"
+    return (
+        chosen.estimator,
+        f"Estimator auto: {name} was swept, which a fit uses; squared prediction error over the base model's on folds of "
+        f"the training rows: {told}.",
+        chosen.scores,
+    )
+
+
+def _cause(error: FerryIdError) -> str:
+    """Return what is wrong, without the remedy."""
+    return str(error).partition(". Fix: ")[0]
+
+
+def _sweep_derivative(request: _Request) -> Sweep:
+    what, profile, settings, run = request.what, request.profile, request.settings, request.run
+    if what != "components" and settings.smoother == "kalman":
         raise FerryIdError(
             "--smoother: the Kalman smoother finds its window by likelihood, so that windows cannot be swept. "
             "Fix: sweep components, or take another --smoother"
         )
-    settings = replace(settings, windows_s=() if weak else tuple(windows_s)).on(profile)
-    if what != "window":
-        settings = replace(settings, components="auto")
-    if weak:
-        return _sweep_weak(what, logs, profile, settings, run, windows_s, folds, archive)
-    settings = replace(settings, estimator="derivative")
-    fixed = (settings.window_s,) if what == "components" else tuple(windows_s)
-    if archive:
+    settings = replace(settings, windows_s=request.windows_s)
+    fixed = (settings.window_s,) if what == "components" else request.windows_s
+    if request.archive:
         windows = fixed or WINDOWS_S
-        functions, free, cuts, told = archive_folds(profile, settings, run, windows, logs, folds)
+        functions, free, cuts, told = archive_folds(profile, settings, run, windows, request.logs, request.folds)
     else:
-        windows, functions, free, cuts, told = _from_logs(logs, profile, settings, run, fixed, folds)
+        windows, functions, free, cuts, told = _from_logs(request.opened, profile, settings, run, fixed, request.folds)
     if what != "components" and len(windows) < 2:
         raise FerryIdError(
             f"{told[0]['name']}: nothing to compare, as all windows come to {windows[0]:g} s at this log's rate. "
@@ -169,21 +254,21 @@ def sweep_settings(
     )
 
 
-def _sweep_weak(
-    what: str,
-    logs: Sequence[str],
-    profile: Profile,
-    settings: FitSettings,
-    run: RunContext,
-    windows_s: Sequence[float],
-    folds: int,
-    archive: bool,
-) -> Sweep:
+def _sweep_weak(request: _Request) -> Sweep:
+    what, profile, settings = request.what, request.profile, request.settings
     lengths_s, basis, test_s, by, told, notes = sweep_weak(
-        logs, profile, settings, run, what=what, windows_s=windows_s, folds=folds, archive=archive
+        request.logs,
+        profile,
+        settings,
+        request.run,
+        what=what,
+        windows_s=request.windows_s,
+        folds=request.folds,
+        archive=request.archive,
+        opened=request.opened,
     )
     if what != "components" and len(lengths_s) < 2:
-        raise FerryIdError(
+        raise TooShort(
             f"{told[0]['name']}: nothing to compare, as only windows of {lengths_s[0]:.3g} s can be fitted. "
             "Fix: give at least two --windows, or longer logs"
         )
@@ -200,7 +285,7 @@ def _sweep_weak(
 
 
 def _from_logs(
-    logs: Sequence[str],
+    opened: Sequence[Opened],
     profile: Profile,
     settings: FitSettings,
     run: RunContext,
@@ -208,7 +293,6 @@ def _from_logs(
     folds: int,
 ) -> tuple[tuple[float, ...], Basis, Flags, dict[str, Folds], list[dict[str, Any]]]:
     """Return windows, basis, axes without force, folds by stretches and whole logs, and what is told of the logs."""
-    opened = read_logs(logs, profile, settings, run)
     windows = windows_to_try(windows_s, [one.measured for one in opened])
     functions = basis_for(settings, [smooth_measured(one.measured, TEST_WINDOW_S) for one in opened])
     pieces = []
@@ -275,6 +359,9 @@ def sweep_json(found: Sweep, report: str | None = None) -> dict[str, Any]:
         "by": {key: _choice_json(choice) for key, choice in found.by.items()},
         "choice": {"window_s": found.choice.window_s, "components": found.choice.components},
         "notes": list(found.notes),
+        "estimator": {"asked": found.asked, "swept": found.settings.estimator, "says": found.estimator_says},
+        "estimators": [one.to_json() for one in found.estimators],
+        "fit_options": list(found.fit_options),
         "report": report,
     }
 

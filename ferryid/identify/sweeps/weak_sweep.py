@@ -23,13 +23,13 @@ from ferryid.identify.model_selection import Selection
 from ferryid.identify.motion_data import numbered_names
 from ferryid.identify.rows import basis_for
 from ferryid.identify.settings import FitSettings, check_components
-from ferryid.identify.split import Split
+from ferryid.identify.split import Split, TooShort
 from ferryid.identify.weak_archive import archived_windows
 from ferryid.identify.windowed_data import KnownWindows, WindowedData
 from ferryid.regression import fit_simpls
 from ferryid.regression.bases import Basis
 from ferryid.regression.cross_validation import MOST_GROUPS, Curves
-from ferryid.signals.prepare import smoothed
+from ferryid.signals.prepare import Opened, smoothed
 from ferryid.types import RunContext
 from ferryid.vessel.dimensions import window_seconds
 from ferryid.vessel.profile import Profile
@@ -57,6 +57,7 @@ def sweep_weak(
     windows_s: Sequence[float],
     folds: int,
     archive: bool,
+    opened: Sequence[Opened] = (),
 ) -> tuple[tuple[float, ...], str, float, dict[str, Selection], list[dict[str, Any]], list[str]]:
     """Cross-validate logs over window lengths and component counts of the weak form.
 
@@ -68,6 +69,8 @@ def sweep_weak(
         ``"components"``: at the settings' window length alone.
     windows_s
         Window lengths to try [s]; the usual ones where none is given.
+    opened
+        The logs, where they were read already.
 
     Returns
     -------
@@ -77,8 +80,10 @@ def sweep_weak(
 
     Raises
     ------
+    TooShort
+        For logs that are too short for the windows in every fold.
     FerryIdError
-        For input that cannot be used, with cause and remedy.
+        For other input that cannot be used, with cause and remedy.
     """
     if settings.residual != "measured":
         raise FerryIdError(
@@ -91,7 +96,10 @@ def sweep_weak(
         lengths_s = sorted({float(one) for one in windows_s} or {max(0.5, each * test_s) for each in USUAL})
     # Says what is wrong with a length before any log is read.
     at = {length_s: replace(settings, weak_window_s=length_s) for length_s in (*lengths_s, test_s)}
-    made, functions = _from_archive(logs, profile, at, run) if archive else _from_logs(logs, profile, at, run)
+    if archive:
+        made, functions = _from_archive(logs, profile, at, run)
+    else:
+        made, functions = _from_logs(opened or read_logs(logs, profile, settings, run), profile, at, run)
     check_components(settings.components, functions)
     cuts = {"blocks": _by_stretches(made[test_s], folds)}
     if len(made[test_s]) > 1:
@@ -100,7 +108,7 @@ def sweep_weak(
     for length_s in lengths_s:
         why = _impossible(profile, at[length_s], functions, made[length_s], cuts)
         if why and (windows_s or what == "components"):
-            raise FerryIdError(
+            raise TooShort(
                 f"{made[test_s][0].name}: {why} in a fold. Fix: give shorter windows, longer logs, or --estimator derivative"
             )
         if why:
@@ -108,7 +116,7 @@ def sweep_weak(
         else:
             tried.append(length_s)
     if not tried:
-        raise FerryIdError(
+        raise TooShort(
             f"{made[test_s][0].name}: too short to cross-validate the weak form. "
             "Fix: give more or longer logs, or --estimator derivative"
         )
@@ -135,10 +143,10 @@ _Made = Mapping[float, Sequence[LogWindows]]
 
 
 def _from_logs(
-    logs: Sequence[str], profile: Profile, at: Mapping[float, FitSettings], run: RunContext
+    logs: Sequence[Opened], profile: Profile, at: Mapping[float, FitSettings], run: RunContext
 ) -> tuple[_Made, Basis]:
     settings = next(iter(at.values()))
-    opened = [smoothed(one, settings.window_s, settings.smoother) for one in read_logs(logs, profile, settings, run)]
+    opened = [smoothed(one, settings.window_s, settings.smoother) for one in logs]
     motions = numbered_names([one.motion for one in opened])
     functions = basis_for(settings, motions)
     made = {}
@@ -242,7 +250,7 @@ def _select(
     tests = [(fold, replace(every, validated=tuple(_tested(judged, fold)), chosen=every.steadied)) for fold in folds]
     tests = [(fold, test) for fold, test in tests if any(len(one) for one in test.validation)]
     if len(tests) < 2:
-        raise FerryIdError(
+        raise TooShort(
             f"{judged[0].name}: cross-validation needs two folds with windows of {judged[0].length_s:.3g} s, "
             f"found {len(tests)}. Fix: use a longer log or more logs"
         )
