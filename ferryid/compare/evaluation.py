@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +12,14 @@ import numpy as np
 from ferryid.compare.thresholds import COMPARE
 from ferryid.identify import check_window
 from ferryid.models import RANGE_UNITS, ForceScores, Model, StoredEffect, force_scores, outside_ranges, usable_rows
-from ferryid.models.prediction import Prediction, predict, predict_base, signal_map
+from ferryid.models.forces import effective_mass, without_inputs
+from ferryid.models.prediction import Prediction, predict, predict_base, signal_map, window_errors, window_scores
 from ferryid.signals.prepare import prepare
 from ferryid.signals.time_ranges import shares_data
 from ferryid.signals.track import Motion
-from ferryid.types import Flags, RunContext
+from ferryid.types import Flags, Floats, RunContext
+from ferryid.vessel import parse_profile
+from ferryid.vessel.dimensions import window_seconds
 from ferryid.vessel.profile import Profile
 
 
@@ -27,9 +31,10 @@ def evaluate(
     profile: Profile | None = None,
     window_s: float | None = None,
 ) -> dict[str, Any]:
-    """Compare a model's and its base model's force with the measured one, and run both free.
+    """Compare a model's and its base model's force with the measured one, predict accelerations, and run both free.
 
-    The base of a model that a diagnosis has changed is the model before it.
+    The base of a model that a diagnosis has changed is the model before it. Accelerations are predicted in windows, as a fit
+    is judged: the base model then knows no measured wind, current or payload.
 
     Parameters
     ----------
@@ -53,7 +58,7 @@ def evaluate(
     check_window(window_s)
     window = float(model.settings["window_s"]) if window_s is None else window_s
     smoother = str(model.settings.get("smoother", "square"))
-    entries, parts = [], []
+    entries, parts, windows = [], [], []
     for path in logs:
         run.progress(f"evaluating on {Path(path).name}")
         prepared = prepare(
@@ -75,6 +80,7 @@ def evaluate(
         old_run = old.free_run(rows)
         new_run = old_run if new is old else new.free_run(rows)
         parts.append((motion.tau[rows], tau_base[rows], tau_model[rows]))
+        windows.append(_in_windows(model, old, new, motion, rows, profile))
         entries.append(
             {
                 "name": motion.log,
@@ -82,6 +88,7 @@ def evaluate(
                 "rows": int(rows.sum()),
                 "seconds": float(rows.sum() / motion.rate_hz),
                 **_scores(force_scores(motion.tau, tau_base, tau_model, rows), profile).to_json(),
+                "prediction": _prediction_json(windows[-1:], profile),
                 "free_run": {
                     "base": old_run.to_json(),
                     "model": new_run.to_json(),
@@ -108,7 +115,35 @@ def evaluate(
         },
         "window_s": window,
         "logs": entries,
-        "pooled": _scores(force_scores(tau, base_all, model_all, np.ones(len(tau), dtype=bool)), profile).to_json(),
+        "pooled": {
+            **_scores(force_scores(tau, base_all, model_all, np.ones(len(tau), dtype=bool)), profile).to_json(),
+            "prediction": _prediction_json(windows, profile),
+        },
+    }
+
+
+def _in_windows(
+    model: Model, old: Prediction, new: Prediction, motion: Motion, rows: Flags, profile: Profile
+) -> tuple[Floats, Floats, Floats]:
+    """Return force, and prediction errors of base model and model, averaged over windows, shape (J, 3) each.
+
+    The base model of a model without a diagnosis sees a log without measured wind, current and payload, as that of a fit does.
+    """
+    own = parse_profile(model.profile_text, model.name)
+    mass = effective_mass(own, model.scale, (), np.zeros((0, 3)))
+    base = old if model.diagnosed else replace(old, motion=without_inputs(old.motion))
+    length_s, reduced = window_seconds(own), not profile.measures_sway
+    force, (base_error, error) = window_errors((base, new), motion, rows, mass, length_s, reduced=reduced)
+    return force, base_error, error
+
+
+def _prediction_json(windows: Sequence[tuple[Floats, Floats, Floats]], profile: Profile) -> dict[str, Any]:
+    """Return the prediction errors of what `_in_windows` returned for every log."""
+    force, base, model = (np.concatenate(columns) for columns in zip(*windows, strict=True))
+    return {
+        "window_s": window_seconds(profile),
+        "windows": len(force),
+        **_scores(window_scores(force, base, model), profile).to_json(),
     }
 
 

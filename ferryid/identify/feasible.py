@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtri
 
-from ferryid.identify.inertia import rigid_body, without_sway_coupling
+from ferryid.identify.inertia import rigid_body
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.weak_rows import to_force
-from ferryid.models.forces import ACCELERATIONS, effective_mass, motion_force
+from ferryid.models.forces import ACCELERATIONS, effective_mass, motion_force, without_sway_coupling
 from ferryid.regression.bases import Basis
 from ferryid.types import AXES, Flags, Floats
 from ferryid.vessel.profile import Profile

@@ -64,13 +64,6 @@ def without_inertia(mask: Flags, terms: Sequence[str], axes: Flags) -> Flags:
     return kept
 
 
-def without_sway_coupling(mass: Floats) -> Floats:
-    """Return mass matrices, shape (..., 3, 3), without what couples sway to surge and yaw: as of a hull that cannot sway."""
-    kept = np.eye(3, dtype=bool)
-    kept[np.ix_((0, 2), (0, 2))] = True
-    return np.asarray(np.where(kept, mass, 0.0))
-
-
 def held_inertia_reason(axis: int, mass: Floats, profile: Profile, force_free: bool) -> str:
     """Return why the inertia of an axis is held, in a sentence."""
     if force_free:

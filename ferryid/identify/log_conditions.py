@@ -17,9 +17,9 @@ import numpy as np
 from ferryid.identify.gusts import GustEquations, Gusts
 from ferryid.identify.outcome import LogWind
 from ferryid.identify.thresholds import IDENTIFY
-from ferryid.identify.weak_rows import STRIDES, WeakRows
+from ferryid.identify.weak_rows import WeakRows
 from ferryid.models.forces import ACCELERATIONS
-from ferryid.regression import window_rows, window_weights
+from ferryid.regression import STRIDES, window_rows, window_weights
 from ferryid.signals.track import Motion
 from ferryid.types import Flags, Floats, Ints
 from ferryid.vessel.profile import Profile, WindAreas

@@ -15,13 +15,12 @@ from functools import cached_property
 import numpy as np
 
 from ferryid.identify.fit_data import Coefficients
-from ferryid.identify.inertia import without_sway_coupling
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.shared_rows import SharedRows
 from ferryid.identify.split import Split
 from ferryid.identify.weak_rows import WeakRows, average_over_windows
 from ferryid.models import ForceScores, ModelScores, force_scores
-from ferryid.models.forces import effective_mass
+from ferryid.models.forces import effective_mass, without_sway_coupling
 from ferryid.regression.bases import Basis
 from ferryid.signals.track import Motion
 from ferryid.types import Flags, Floats

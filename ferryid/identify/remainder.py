@@ -19,7 +19,6 @@ from ferryid.identify.outcome import FitOutcome
 from ferryid.identify.pipeline import fit_opened
 from ferryid.identify.rows import basis_for
 from ferryid.identify.settings import FitSettings
-from ferryid.identify.weak_rows import average_over_windows
 from ferryid.models import Model, Quantity
 from ferryid.models.forces import (
     ModelForces,
@@ -28,8 +27,8 @@ from ferryid.models.forces import (
     hull_contribution,
     replace_hull_coefficients,
 )
-from ferryid.models.prediction import predict, predict_with_effects, predicted_acceleration
-from ferryid.regression.bases import Basis, make_basis
+from ferryid.models.prediction import predict, predict_with_effects, window_errors
+from ferryid.regression.bases import Basis
 from ferryid.signals.prepare import Opened, Prepared, smoothed
 from ferryid.signals.smooth import Measured
 from ferryid.signals.track import Motion
@@ -132,26 +131,19 @@ def prediction_errors(
     list of ndarray
         Mean square error of each model, shape (3,) [N², N², (N·m)²], on the same windows; NaN where there is none.
     """
-    functions = make_basis("modulus", structure="decoupled")
-    scale = settings.scale
-    mass = effective_mass(profile, scale, (), np.zeros((0, 3)))
+    mass = effective_mass(profile, settings.scale, (), np.zeros((0, 3)))
     length_s = settings.weak_window_s or window_seconds(profile)
-    squares = [np.zeros((0, 3)) for _ in models]
+    squares = [[np.zeros((0, 3))] for _ in models]
     for opened, wanted in zip(read_logs(paths, profile, settings, run), rows, strict=True):
         prepared = smoothed(opened, settings.window_s, settings.smoother, keep_track=True)
-        seen = []
-        for model in models:
-            found = predict(model, prepared, profile, window_s=settings.window_s, smoother=settings.smoother)
-            expected = predicted_acceleration(found.force, found.motion)
-            still = replace(found.motion, tau=expected @ mass.T, wind=None, current=None, payload=None)
-            seen.append((still, np.isfinite(expected).all(axis=1)))
-        # A model that has no acceleration at all has infinite errors and takes no row from the others.
-        common = wanted & np.logical_and.reduce([known for _, known in seen if known.any()])
-        for k, (still, known) in enumerate(seen):
-            windows = average_over_windows(still, common, profile, scale, functions, length_s)
-            error = windows.force - windows.by_velocity @ mass.T
-            squares[k] = np.concatenate([squares[k], error**2 if known.any() else np.full_like(error, np.inf)])
-    return [one.mean(axis=0) if len(one) else np.full(3, np.nan) for one in squares]
+        found = [
+            predict(model, prepared, profile, window_s=settings.window_s, smoother=settings.smoother)
+            for model in models
+        ]
+        for own, error in zip(squares, window_errors(found, prepared.motion, wanted, mass, length_s)[1], strict=True):
+            own.append(error**2)
+    every = [np.concatenate(own) for own in squares]
+    return [one.mean(axis=0) if len(one) else np.full(3, np.nan) for one in every]
 
 
 def _settings_of(model: Model, settings: FitSettings) -> FitSettings:

@@ -17,16 +17,16 @@ from ferryid.errors import FerryIdError
 from ferryid.identify.contradictions import response_of, wrong_size, wrong_way
 from ferryid.identify.feasible import Feasible, LiftTie, feasible_gains
 from ferryid.identify.fit_data import Estimate
-from ferryid.identify.inertia import relative_inertia, without_inertia, without_sway_coupling
+from ferryid.identify.inertia import relative_inertia, without_inertia
 from ferryid.identify.log_conditions import Conditions, LoadSamples, estimate_conditions, sample_load
 from ferryid.identify.motion_data import LogData
 from ferryid.identify.outcome import Excitation, LogWind
 from ferryid.identify.prediction_windows import PredictionWindows
 from ferryid.identify.settings import FOLDS
 from ferryid.identify.thresholds import IDENTIFY
-from ferryid.identify.weak_rows import STRIDES, WeakRows, to_force
-from ferryid.models.forces import ACCELERATIONS, MAPPED
-from ferryid.regression import CrossProducts, QrFactor, Rows, Simpls, fit_simpls
+from ferryid.identify.weak_rows import WeakRows, to_force
+from ferryid.models.forces import ACCELERATIONS, MAPPED, without_sway_coupling
+from ferryid.regression import STRIDES, CrossProducts, QrFactor, Rows, Simpls, fit_simpls
 from ferryid.regression.cross_validation import Folds
 from ferryid.regression.resampling import Blocks, block_seconds
 from ferryid.types import Flags, Floats, Ints

@@ -19,15 +19,13 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from ferryid.models.forces import ACCELERATIONS, base_force, without_inputs
-from ferryid.regression import window_rows, window_weights
+from ferryid.regression import window_rows, window_starts, window_sums, window_weights
 from ferryid.regression.bases import Basis
 from ferryid.signals.track import Motion, segments
 from ferryid.types import Flags, Floats, Ints
 from ferryid.vessel.hull import payload_mass
 from ferryid.vessel.profile import Profile
 
-STRIDES = 2
-"""Windows begin this often in the length of one: neighbours then share little, and no row is lost."""
 _CHUNK_WINDOWS = 4096
 
 
@@ -130,28 +128,23 @@ def average_over_windows(
     """
     step_s = 1.0 / motion.rate_hz
     m = window_rows(length_s, motion.rate_hz)
-    stride = max(1, m // STRIDES)
     weight, slope, bend = (step_s * each for each in window_weights(m, step_s))
-    starts, runs = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
-    for number, stretch in enumerate(segments(rows)):
-        starts.append(np.arange(stretch.start, stretch.stop - m + 1, stride))
-        runs.append(np.full(len(starts[-1]), number))
-    start, run = np.concatenate(starts), np.concatenate(runs)
+    start, run = window_starts(segments(rows), m)
 
     nu = motion.nu if velocity is None else velocity
     columns = row_columns(motion, profile, scale, functions, nu) if columns is None else columns
-    means = {name: _sums(values, weight, start) for name, values in columns.items()}
+    means = {name: window_sums(values, weight, start) for name, values in columns.items()}
     mass = profile.hull.M * scale.get("delta", 1.0)
     inertia = np.broadcast_to(mass, (len(start), 3, 3))
     if motion.payload is not None:
-        inertia = inertia + payload_mass(_sums(np.nan_to_num(motion.payload), weight, start))
+        inertia = inertia + payload_mass(window_sums(np.nan_to_num(motion.payload), weight, start))
     return WeakRows(
         functions=means["functions"],
         force=means["force"],
         steady=means["steady"],
         bare=means["bare"],
         inertia=inertia / scale.get("zeta", 1.0),
-        by_velocity=-_sums(motion.nu, slope, start),
+        by_velocity=-window_sums(motion.nu, slope, start),
         by_pose=_by_pose(motion.eta, nu[:, 2], slope, bend, start),
         heading=means["heading"],
         run=run,
@@ -204,17 +197,6 @@ def to_force(gains: Floats, intercept: Floats, terms: tuple[str, ...], mass: Flo
     for column, row in places:
         theta[..., row, :] = added[..., :, column]
     return theta, np.einsum("...ab,...b->...a", inverse, intercept)
-
-
-def _sums(values: Floats, weights: Floats, starts: Ints) -> Floats:
-    """Return the sum of m rows times m weights from every start on, shape (J, c), of values with c columns."""
-    out = np.empty((len(starts), values.shape[1]))
-    if len(starts):
-        windows = sliding_window_view(values, len(weights), axis=0)
-        for low in range(0, len(starts), _CHUNK_WINDOWS):
-            chunk = starts[low : low + _CHUNK_WINDOWS]
-            out[low : low + len(chunk)] = windows[chunk] @ weights
-    return out
 
 
 def _by_pose(eta: Floats, yaw_rate: Floats, slope: Floats, bend: Floats, starts: Ints) -> Floats:

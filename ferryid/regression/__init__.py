@@ -16,11 +16,12 @@ if TYPE_CHECKING:
     from ferryid.regression.pca import principal_components
     from ferryid.regression.qr import QrFactor, factorise
     from ferryid.regression.simpls import Simpls, fit_simpls, total
-    from ferryid.regression.test_function import window_rows, window_weights
+    from ferryid.regression.test_function import STRIDES, window_rows, window_starts, window_sums, window_weights
     from ferryid.regression.thresholds import REGRESSION
 
 __all__ = [
     "REGRESSION",
+    "STRIDES",
     "CrossProducts",
     "QrFactor",
     "Rows",
@@ -34,6 +35,8 @@ __all__ = [
     "total",
     "undetermined_terms",
     "window_rows",
+    "window_starts",
+    "window_sums",
     "window_weights",
 ]
 
@@ -63,7 +66,10 @@ __getattr__ = import_on_demand(
             "total",
         ),
         "test_function": (
+            "STRIDES",
             "window_rows",
+            "window_starts",
+            "window_sums",
             "window_weights",
         ),
         "thresholds": ("REGRESSION",),

@@ -10,11 +10,17 @@ Shinbrot (1957); Messenger and Bortz (2021), Weak SINDy, for the choice of test 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import pi
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
-from ferryid.types import Floats
+from ferryid.types import Floats, Ints
+
+STRIDES = 2
+"""Windows begin this often in the length of one: neighbours then share little, and no row is lost."""
+_CHUNK_WINDOWS = 4096
 
 
 def window_rows(length_s: float, rate_hz: float) -> int:
@@ -32,3 +38,23 @@ def window_weights(m: int, step_s: float) -> tuple[Floats, Floats, Floats]:
     slope = 4.0 * sine**3 * cosine * (pi / T)
     bend = (12.0 * sine**2 * cosine**2 - 4.0 * sine**4) * (pi / T) ** 2
     return scale * weight, scale * slope, scale * bend
+
+
+def window_starts(stretches: Sequence[slice], m: int) -> tuple[Ints, Ints]:
+    """Return the first row of every window of m rows that lies wholly within an unbroken stretch, and the stretch's number."""
+    starts, numbers = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
+    for number, stretch in enumerate(stretches):
+        starts.append(np.arange(stretch.start, stretch.stop - m + 1, max(1, m // STRIDES)))
+        numbers.append(np.full(len(starts[-1]), number))
+    return np.concatenate(starts), np.concatenate(numbers)
+
+
+def window_sums(values: Floats, weights: Floats, starts: Ints) -> Floats:
+    """Return the sum of m rows times m weights from every start on, shape (J, c), of values with c columns."""
+    out = np.empty((len(starts), values.shape[1]))
+    if len(starts):
+        windows = sliding_window_view(values, len(weights), axis=0)
+        for low in range(0, len(starts), _CHUNK_WINDOWS):
+            chunk = starts[low : low + _CHUNK_WINDOWS]
+            out[low : low + len(chunk)] = windows[chunk] @ weights
+    return out

@@ -8,6 +8,9 @@ import numpy as np
 
 from ferryid.types import AXES
 
+_ROWS = ("MSE over the base model's", "rms error, {} [N, N, N·m]", "R², model")
+_WINDOWS = ("squared prediction error / base", "  rms, {} [N, N, N·m]", "  R², model")
+
 
 def render_evaluation(result: dict[str, Any]) -> str:
     """Return an evaluation as text."""
@@ -19,32 +22,60 @@ def render_evaluation(result: dict[str, Any]) -> str:
     entries = [*result["logs"], {"name": "all logs", **result["pooled"]}] if len(result["logs"]) > 1 else result["logs"]
     for entry in entries:
         lines.append(entry["name"])
-        ratio = "".join(f"{_number(entry['per_axis'][axis]):>11}" for axis in AXES)
-        lines.append(f"{'  MSE over the base model' + chr(39) + 's':<34}{ratio}{_number(entry['normalised_mse']):>9}")
-        for label, part in (("base", "base"), ("model", "model")):
-            lines.append(
-                f"{'  rms error, ' + label + ' [N, N, N·m]':<34}"
-                + "".join(f"{_root(entry['mse'][part][axis]):>11}" for axis in AXES)
-            )
-        lines.append(f"{'  R², model':<34}" + "".join(f"{_number(entry['r2']['model'][axis]):>11}" for axis in AXES))
+        lines.extend(_score_lines(entry, _ROWS))
+        if "prediction" in entry:
+            lines.extend(_prediction_lines(entry["prediction"]))
         if "free_run" in entry:
             lines.extend(_free_run_lines(entry["free_run"]))
-        lines.append(f"  {_verdict(entry)}")
+        lines.append(f"  {_verdict(entry, 'mean square force error')}")
+        if entry.get("prediction", {}).get("windows"):
+            lines.append(f"  {_verdict(entry['prediction'], 'squared prediction error in windows')}")
         applied = entry.get("effects", {"vessel": (), "conditions": (), "left_out": ()})
         lines.extend(f"  acts, as in every log: {one['says']}" for one in applied["vessel"])
         lines.extend(f"  acts, as in this log: {one['says']}" for one in applied["conditions"])
         lines.extend(f"  {told}" for told in applied["left_out"])
         lines.extend(f"  warning: {warning}" for warning in entry.get("warnings", ()))
+    if any("prediction" in entry for entry in entries):
+        lines += ["", *_explained(result["pooled"]["prediction"]["window_s"])]
     return "\n".join(lines)
 
 
-def _verdict(entry: dict[str, Any]) -> str:
+def _score_lines(scores: dict[str, Any], labels: tuple[str, str, str]) -> list[str]:
+    """Return the errors of base model and model as lines, with labels of squares, roots and R²."""
+    squares, root, r2 = labels
+    ratio = "".join(f"{_number(scores['per_axis'][axis]):>11}" for axis in AXES)
+    lines = [f"{f'  {squares}':<34}{ratio}{_number(scores['normalised_mse']):>9}"]
+    for part in ("base", "model"):
+        values = "".join(f"{_root(scores['mse'][part][axis]):>11}" for axis in AXES)
+        lines.append(f"{'  ' + root.format(part):<34}{values}")
+    lines.append(f"{f'  {r2}':<34}" + "".join(f"{_number(scores['r2']['model'][axis]):>11}" for axis in AXES))
+    return lines
+
+
+def _prediction_lines(scores: dict[str, Any]) -> list[str]:
+    if not scores["windows"]:
+        return [f"  no prediction error: no unbroken stretch of {scores['window_s']:.3g} s"]
+    return _score_lines(scores, _WINDOWS)
+
+
+def _explained(window_s: float) -> list[str]:
+    """Return what the two kinds of errors are, as lines."""
+    return [
+        "MSE, rms error: the applied force estimated row by row from the motion, against the measured one. The noise of the",
+        "  differentiated velocity is in it, and is the most of it in many logs.",
+        "prediction error: the acceleration predicted from force and velocity, against the measured one, averaged over",
+        f"  windows of {window_s:.3g} s, as force on the base model's mass, as fit judges. Little of the noise is in it. The",
+        "  base model is without measured wind, current and payload there.",
+    ]
+
+
+def _verdict(entry: dict[str, Any], error: str) -> str:
     mean = entry["normalised_mse"]
     worse = [axis for axis in AXES if np.isfinite(entry["per_axis"][axis]) and entry["per_axis"][axis] > 1.05]
     if not np.isfinite(mean):
         return "cannot be judged: the base model makes no error here"
     better = mean < 1.0
-    told = f"{abs(mean - 1.0):.0%} {'better' if better else 'worse'} than its base model here (mean square force error)"
+    told = f"{abs(mean - 1.0):.0%} {'better' if better else 'worse'} than its base model here ({error})"
     if not worse:
         return told
     if len(worse) == len(AXES):

@@ -14,7 +14,7 @@ from ferryid.errors import FerryIdError
 from ferryid.models import Conditions, Model, StoredEffect, force_scores, usable_rows
 from ferryid.models.prediction import FreeRun, Prediction, predict
 from ferryid.models.store import load_file
-from ferryid.regression import window_rows, window_weights
+from ferryid.regression import window_rows, window_starts, window_sums, window_weights
 from ferryid.signals.prepare import Prepared
 from ferryid.signals.track import segments
 from ferryid.types import AXES, Floats
@@ -134,9 +134,7 @@ def window_errors(errors: Floats, rows: Rows, rate_hz: float, length_s: float) -
         Shape (J, 3).
     """
     m = window_rows(length_s, rate_hz)
-    weight = window_weights(m, 1.0 / rate_hz)[0] / rate_hz
-    starts = [begin for one in segments(rows) for begin in range(one.start, one.stop - m + 1, max(1, m // 2))]
-    return np.array([weight @ errors[begin : begin + m] for begin in starts]).reshape(-1, 3)
+    return window_sums(errors, window_weights(m, 1.0 / rate_hz)[0] / rate_hz, window_starts(segments(rows), m)[0])
 
 
 def transferred(model: Model, first: Prepared, second: Prepared) -> Model:

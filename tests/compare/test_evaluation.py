@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +10,18 @@ import pytest
 
 from ferryid.compare import evaluate
 from ferryid.files import dump_json
-from ferryid.models import Model, blank_model
+from ferryid.identify import FitOutcome, FitSettings, fit_logs
+from ferryid.identify.fit_data import Coefficients
+from ferryid.identify.prediction_windows import PredictionWindows
+from ferryid.identify.split import Split
+from ferryid.models import Model, blank_model, usable_rows
+from ferryid.models.forces.estimator import base_estimator, model_estimator
+from ferryid.models.prediction import Prediction, window_errors
 from ferryid.models.scores import force_scores
+from ferryid.regression.bases import make_basis
 from ferryid.report.evaluation_text import render_evaluation
-from ferryid.types import RunContext
+from ferryid.signals.prepare import prepare
+from ferryid.types import AXES, RunContext
 from ferryid.vessel import load_profile
 
 LOG = Path(__file__).resolve().parents[2] / "fixtures" / "short.mcap"
@@ -45,6 +54,89 @@ def test_the_verdict_says_where_a_model_is_worse(ratios: tuple[float, float, flo
     scores = force_scores(tau, base, model, np.ones(N, dtype=bool))
     text = render_evaluation({**HEAD, "logs": [{"name": "log", **scores.to_json()}]})
     assert f"  {told}" in text.splitlines()
+
+
+def shown(told: str, part: str) -> list[str]:
+    """Return the lines of a text that contain a part."""
+    return [line for line in told.splitlines() if part in line]
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory: pytest.TempPathFactory) -> FitOutcome:
+    settings = FitSettings(delta=0.4, sigma=0.4, components=9, draws=1, estimator="derivative")
+    return fit_logs([str(LOG)], load_profile("milliampere"), settings, RunContext(tmp_path_factory.mktemp("fit")))
+
+
+@pytest.mark.slow
+def test_predictions_are_judged_in_windows_as_a_fit_judges_them(fitted: FitOutcome, tmp_path: Path) -> None:
+    told = evaluate(fitted.model, [str(LOG), str(LOG.with_suffix(".bag"))], RunContext(tmp_path))
+    for entry in (*told["logs"], told["pooled"]):
+        prediction = entry["prediction"]
+        assert prediction["window_s"] == pytest.approx(8.0)
+        # Noise is the most of the force error of a row, and hardly any of that of a window.
+        assert prediction["normalised_mse"] < 0.5 * entry["normalised_mse"]
+        ratio = [prediction["mse"]["model"][axis] / prediction["mse"]["base"][axis] for axis in AXES]
+        assert ratio == pytest.approx([prediction["per_axis"][axis] for axis in AXES])
+    windows = [entry["prediction"]["windows"] for entry in told["logs"]]
+    assert told["pooled"]["prediction"]["windows"] == sum(windows) > 20
+    pooled = np.average([one["prediction"]["mse"]["model"]["yaw"] for one in told["logs"]], weights=windows)
+    assert told["pooled"]["prediction"]["mse"]["model"]["yaw"] == pytest.approx(pooled)
+    text = render_evaluation(told)
+    assert len(shown(text, "squared prediction error / base")) == len(shown(text, "MSE over the base model's")) == 3
+    assert len(shown(text, "than its base model here (squared prediction error in windows)")) == 3
+    assert len(shown(text, "windows of 8 s, as force on the base model's mass, as fit judges.")) == 1
+    assert max(len(line) for line in text.splitlines() if "warning" not in line) <= 120
+
+
+@pytest.mark.slow
+def test_the_errors_in_windows_are_those_of_a_fit(fitted: FitOutcome, tmp_path: Path) -> None:
+    """On the same rows and with measured velocities, from predicted accelerations as from averaged equations of motion."""
+    model, profile = fitted.model, load_profile("milliampere")
+    motion = prepare(str(LOG), profile, tmp_path, window_s=1.0).motion
+    motion = replace(
+        motion, valid=usable_rows(motion, base_estimator(model).of(motion), model_estimator(model).of(motion))
+    )
+    functions = make_basis(str(model.settings["basis"]), structure="decoupled")
+    everything = replace(Split.nothing([motion]), kind="blocks", validation=(motion.valid,))
+    settings = FitSettings(delta=0.4, sigma=0.4)
+    windows = PredictionWindows(profile, settings, functions, (motion,), everything)
+    nothing = np.full((len(model.terms), 3), np.nan)
+    found = Coefficients(model.theta, model.intercept, nothing, nothing, nothing[0], nothing[0], np.zeros(0))
+    expected = windows.errors(found)
+    told = evaluate(model, [str(LOG)], RunContext(tmp_path), window_s=1.0)["logs"][0]["prediction"]
+    assert list(told["mse"]["model"].values()) == pytest.approx(expected.mse_model, rel=1e-9)
+    assert list(told["mse"]["base"].values()) == pytest.approx(expected.mse_base, rel=1e-9)
+    assert list(told["r2"]["model"].values()) == pytest.approx(expected.r2_model, rel=1e-9)
+
+
+@pytest.mark.slow
+def test_a_log_shorter_than_a_window_has_no_prediction_error(tmp_path: Path) -> None:
+    profile = load_profile("milliampere")
+    context = RunContext(tmp_path, ranges=((0.0, 7.0),))
+    told = evaluate(blank_model(profile, "bare"), [str(LOG)], context, profile=profile)
+    for entry in (told["logs"][0], told["pooled"]):
+        assert entry["prediction"]["windows"] == 0
+        assert np.isnan(entry["prediction"]["normalised_mse"])
+    text = render_evaluation(told)
+    assert shown(text, "no prediction error: no unbroken stretch of 8 s")
+    assert not shown(text, "prediction error in windows")
+
+
+def test_a_mass_that_cannot_be_inverted_errs_without_end_and_takes_no_row(fitted: FitOutcome, tmp_path: Path) -> None:
+    model, motion = fitted.model, fitted.logs[0].motion
+    theta = model.theta.copy()
+    theta[model.terms.index("u_dot"), 0] = -1e6
+    two = [Prediction(motion.tau, motion, model_estimator(one)) for one in (model, replace(model, theta=theta))]
+    mass = np.diag([2000.0, 2000.0, 5000.0])
+    force, (good, bad) = window_errors(two, motion, motion.valid, mass, 8.0)
+    alone = window_errors(two[:1], motion, motion.valid, mass, 8.0)
+    assert len(force) > 10
+    np.testing.assert_array_equal(good, alone[1][0])
+    assert np.isinf(bad).all()
+    # Without sway the errors are those of a hull that cannot sway.
+    _, (reduced,) = window_errors(two[:1], motion, motion.valid, mass, 8.0, reduced=True)
+    np.testing.assert_allclose(reduced[:, 0], good[:, 0], rtol=1e-9)
+    assert not np.allclose(reduced[:, 2], good[:, 2], rtol=1e-6)
 
 
 @pytest.mark.slow

@@ -90,7 +90,7 @@ NO_DECISION = {
         signals.smooth _POLYNOMIAL
         signals.complementary_filter MEAN_S SLOW_S
         diagnose.data.measurements STRIDES
-        identify.weak_rows STRIDES
+        regression.test_function STRIDES
         diagnose.data.path_comparison RATE_HZ
         diagnose.checks.spans LENGTH_S STRIDE_S RATE_HZ
         diagnose.checks.kinematics DERIVATIVE_S
@@ -146,6 +146,7 @@ NO_DECISION = {
     """,
     "sizes: rows held at once, draws, folds, bins, and how much is shown": """
         identify.weak_rows _CHUNK_WINDOWS
+        regression.test_function _CHUNK_WINDOWS
         identify.shared_rows MOST_ROWS
         signals.kalman _LEAST_ROWS _FIT_ROWS
         signals.poses _STEPS_SAID

@@ -7,6 +7,7 @@ from ferryid.models.forces.estimator import (
     hull_coefficients,
     model_estimator,
     replace_hull_coefficients,
+    without_sway_coupling,
 )
 from ferryid.models.forces.hull_terms import (
     MAPPED,
@@ -41,4 +42,5 @@ __all__ = [
     "scale_hull",
     "unmapped_terms",
     "without_inputs",
+    "without_sway_coupling",
 ]

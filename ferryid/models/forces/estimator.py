@@ -149,3 +149,10 @@ def effective_mass(profile: Profile, scale: Mapping[str, float], terms: Sequence
         if name in terms:
             mass[:, column] += theta[terms.index(name)]
     return np.asarray(mass, dtype=np.float64)
+
+
+def without_sway_coupling(mass: Floats) -> Floats:
+    """Return mass matrices, shape (..., 3, 3), without what couples sway to surge and yaw: as of a hull that cannot sway."""
+    kept = np.eye(3, dtype=bool)
+    kept[np.ix_((0, 2), (0, 2))] = True
+    return np.asarray(np.where(kept, mass, 0.0))

@@ -12,6 +12,7 @@ from ferryid.models.prediction.free_run import (
     starting_points,
 )
 from ferryid.models.prediction.log_prediction import Prediction, predict, predict_base, predict_with_effects, signal_map
+from ferryid.models.prediction.window_averages import window_errors, window_scores
 
 __all__ = [
     "HORIZONS_S",
@@ -28,4 +29,6 @@ __all__ = [
     "signal_map",
     "single_runs",
     "starting_points",
+    "window_errors",
+    "window_scores",
 ]

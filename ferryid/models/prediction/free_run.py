@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ferryid.counts import counted, verb
-from ferryid.models.forces.estimator import ForceLaw
+from ferryid.models.forces.estimator import ForceLaw, without_sway_coupling
 from ferryid.models.thresholds import MODELS
 from ferryid.signals.track import Motion
 from ferryid.types import Flags, Floats, Ints
@@ -183,12 +183,14 @@ def single_runs(force: ForceLaw, motion: Motion, starts: Ints, ends: Ints, horiz
     return _errors(path, stride, motion, starts, ends, horizons)
 
 
-def predicted_acceleration(force: ForceLaw, motion: Motion) -> Floats:
+def predicted_acceleration(force: ForceLaw, motion: Motion, *, coupled_sway: bool = True) -> Floats:
     """Return the acceleration that a model expects in every row from force and velocity [m/s², m/s², rad/s²], shape (n, 3).
 
-    NaN where what it needs was not measured, and everywhere where its mass matrix cannot be inverted.
+    NaN where what it needs was not measured, and everywhere where its mass matrix cannot be inverted. Without `coupled_sway`
+    surge and yaw accelerate as if the hull could not sway.
     """
     masses = _masses(force, motion)
+    masses = masses if coupled_sway else without_sway_coupling(masses)
     if not (np.linalg.det(masses) > 0.0).all():
         return np.full_like(motion.nu, np.nan)
     payload = () if motion.payload is None else (motion.payload,)
