@@ -8,11 +8,19 @@ import numpy as np
 
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.types import AXES, Flags, Floats
+from ferryid.vessel.profile import Profile
 
 _FORCES = ("surge force", "sway force", "yaw moment")
 
 
-def wrong_way(response: Floats, spread: Floats, profile: str, angles: Sequence[str] = (), actuators: int = 2) -> str:
+def wrong_way(
+    response: Floats,
+    spread: Floats,
+    profile: str,
+    angles: Sequence[str] = (),
+    actuators: int = 2,
+    pairs: Sequence[tuple[str, str]] = (),
+) -> str:
     """Return what is wrong and how to mend it where the vessel accelerates against the applied force; empty where it does not.
 
     Parameters
@@ -28,6 +36,8 @@ def wrong_way(response: Floats, spread: Floats, profile: str, angles: Sequence[s
         Signals that say where actuators push, such as ``stern.rudder``.
     actuators
         How many there are: one cannot be taken for another.
+    pairs
+        Signals of one actuator with those of another that may have been exchanged.
     """
     wrong = [axis for axis in range(3) if response[axis] < -IDENTIFY.wrong_way_sigmas * spread[axis]]
     if not wrong:
@@ -51,12 +61,28 @@ def wrong_way(response: Floats, spread: Floats, profile: str, angles: Sequence[s
     else:
         causes = ["actuators are exchanged (port and starboard, bow and stern)"] if actuators > 1 else []
         causes += ["an angle has the wrong sign"] if angles else []
-        remedies = ["exchange the signals of the actuators"] if actuators > 1 else []
+        lines = ", ".join(f'[signals."{one}"] with [signals."{other}"]' for one, other in pairs)
+        exchange = f"exchange the signals of the actuators{f' ({lines})' if lines else ''}"
+        remedies = [exchange] if actuators > 1 else []
         tables = " or ".join(f'[signals."{one}"]' for one in angles)
         remedies += [f"turn the sign in {tables}"] if angles else []
         cause = ", or ".join([*causes, "heading and yaw rate count anticlockwise"])
         remedy = ", or ".join([*remedies, "set the frames of heading and yaw rate"])
     return f"{told}: {cause}. Fix: in {profile}, {remedy}"
+
+
+def signs_of(profile: Profile) -> tuple[list[str], int, list[tuple[str, str]]]:
+    """Return signals that say where actuators push, the number of actuators, and signals of two that may be exchanged."""
+    quantities = [one.quantity for one in profile.signals]
+    angles = [one for one in quantities if one.endswith((".rudder", ".angle"))]
+    pairs = list[tuple[str, str]]()
+    if len(profile.actuators) == 2:
+        first, second = (one.name for one in profile.actuators)
+        kinds = [one.removeprefix(f"{first}.") for one in quantities if one.startswith(f"{first}.")]
+        shared = [kind for kind in kinds if f"{second}.{kind}" in quantities]
+        measured = [kind for kind in shared if not kind.endswith(".command")]
+        pairs = [(f"{first}.{kind}", f"{second}.{kind}") for kind in measured or shared]
+    return angles, len(profile.actuators), pairs
 
 
 def wrong_size(response: Floats, spread: Floats, share: Floats, profile: str) -> str:

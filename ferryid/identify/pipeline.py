@@ -19,6 +19,7 @@ from ferryid.identify.estimators import choose_estimator
 from ferryid.identify.excitation import still_axes
 from ferryid.identify.fit_data import Coefficients, Estimate, FitData
 from ferryid.identify.fit_warnings import free_run_warnings
+from ferryid.identify.force_signs import refuse_reversed_forces
 from ferryid.identify.free_run_checks import free_run_checks
 from ferryid.identify.held_out_checks import held_out_checks
 from ferryid.identify.inputs import read_logs
@@ -29,7 +30,7 @@ from ferryid.identify.outcome import ComponentCurve, EstimatorScore, Excitation,
 from ferryid.identify.physical_checks import physical_checks
 from ferryid.identify.rows import basis_for
 from ferryid.identify.settings import TEST_WINDOW_S, FitSettings, check_components
-from ferryid.identify.split import Split, split_rows
+from ferryid.identify.split import Split, TooShort, split_rows
 from ferryid.identify.weak_data import WeakData, weak_data
 from ferryid.identify.window_length import with_best_length
 from ferryid.models import Model, ModelScores
@@ -77,7 +78,7 @@ def fit_opened(
     estimate = estimate_correction(chosen.data, chosen.components, settings.draws, run.progress)
     outcome = accept_estimate(chosen.data, estimate, name, run)
     told = (f"The derivative's estimator was used: {chosen.why}.",) if chosen.why else ()
-    return replace(outcome, warnings=(*outcome.warnings, *told), estimators=chosen.scores)
+    return replace(outcome, warnings=(*outcome.warnings, *chosen.notes, *told), estimators=chosen.scores)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,12 +93,15 @@ class ChosenData:
         How well either estimator predicts, where both were compared.
     why
         Why the weak form, which was not ruled out, cannot be used; empty where it can.
+    notes
+        What the logs leave undecided, as sentences.
     """
 
     data: LogData
     components: int
     scores: tuple[EstimatorScore, ...] = ()
     why: str = ""
+    notes: tuple[str, ...] = ()
 
     @property
     def estimator(self) -> str:
@@ -113,26 +117,35 @@ def estimator_for(opened: Sequence[Opened], profile: Profile, settings: FitSetti
     FerryIdError
         For logs that a fit refuses, with cause and remedy.
     """
-    data, training = _prepare(opened, profile, settings, run)
-    run.progress("fitting")
-    return _choose_data(data, training, opened, run)
-
-
-def _prepare(
-    opened: Sequence[Opened], profile: Profile, settings: FitSettings, run: RunContext
-) -> tuple[LogData, Sequence[Flags]]:
-    """Return smoothed logs with their residuals, split, and the training rows with those on which something is unknown."""
     parts = None
     if settings.windows_s:
         run.progress("choosing the window")
         settings, parts = _select_window(profile, settings, opened)
+    data = _prepare(opened, profile, settings, run)
+    undecided = refuse_reversed_forces(data) if settings.estimator != "derivative" else ""
+    if parts is None:
+        parts = _split(data, undecided)
+    run.progress("fitting")
+    data = replace(data, split=parts.within([motion.valid for motion in data.motions]))
+    chosen = _choose_data(data, parts.training, opened, run)
+    return replace(chosen, notes=(undecided,) if undecided else ())
+
+
+def _prepare(opened: Sequence[Opened], profile: Profile, settings: FitSettings, run: RunContext) -> LogData:
+    """Return smoothed logs with their residuals; no row trains or validates yet."""
     prepared = [smoothed(one, settings.window_s, settings.smoother) for one in opened]
     run.progress("computing the residual")
     data = compute_residuals(profile, settings, prepared)
-    data = replace(data, functions=data.functions.without(still_axes(profile, data.motions)))
-    if parts is None:
-        parts = split_rows(data.motions, settings.split, window_s=settings.window_s)
-    return replace(data, split=parts.within([motion.valid for motion in data.motions])), parts.training
+    return replace(data, functions=data.functions.without(still_axes(profile, data.motions)))
+
+
+def _split(data: LogData, undecided: str) -> Split:
+    """Return which rows train and validate; a refusal of logs that are too short says what else they leave undecided."""
+    try:
+        return split_rows(data.motions, data.settings.split, window_s=data.settings.window_s)
+    except TooShort as error:
+        cause, fix, remedy = str(error).partition(" Fix: ")
+        raise TooShort(" ".join(filter(None, [cause, undecided])) + fix + remedy) from error
 
 
 def _choose_data(data: LogData, training: Sequence[Flags], opened: Sequence[Opened], run: RunContext) -> ChosenData:

@@ -158,6 +158,12 @@ class IdentifyThresholds:
         "an acceleration that goes against the applied force by less does not show a sign that is reversed",
         "derived: a reversed sign gives minus one over the share of added mass, and no inertia is above 5",
     )
+    response_window: float = threshold(
+        0.5,
+        "of the usual window",
+        "length of the windows in which the way is judged that forces act",
+        "tuned on real recordings: small vessels turn to and fro within the usual one, and longer trials show it with either",
+    )
     pose_agreement: float = threshold(
         0.5,
         "-",

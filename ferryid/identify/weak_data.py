@@ -14,7 +14,7 @@ from ferryid.counts import counted
 from ferryid.effects.force_model import COEFFICIENTS, hull_of
 from ferryid.effects.hull_spread import default_hull_spread
 from ferryid.errors import FerryIdError
-from ferryid.identify.contradictions import response_of, wrong_size, wrong_way
+from ferryid.identify.contradictions import response_of, signs_of, wrong_size, wrong_way
 from ferryid.identify.feasible import Feasible, LiftTie, feasible_gains
 from ferryid.identify.fit_data import Estimate
 from ferryid.identify.inertia import relative_inertia, without_inertia
@@ -464,8 +464,7 @@ class WeakData(LogData):
         response, spread = response_of(gains, self.information, mask, places)
         where = f"the profile {self.profile.name}"
         share = relative_inertia(self.profile, self.windows.base_mass)
-        angles = [one.quantity for one in self.profile.signals if one.quantity.endswith((".rudder", ".angle"))]
-        against = wrong_way(response, spread, where, angles, len(self.profile.actuators))
+        against = wrong_way(response, spread, where, *signs_of(self.profile))
         if told := against or wrong_size(response, spread, share, where):
             raise FerryIdError(f"{self.where}: {told}")
 
