@@ -12,14 +12,14 @@ import numpy as np
 
 from ferryid.errors import FerryIdError
 from ferryid.identify.contradictions import signs_of, wrong_way
-from ferryid.identify.inertia import without_inertia
+from ferryid.identify.inertia import relative_inertia, without_inertia
 from ferryid.identify.motion_data import LogData
 from ferryid.identify.split import Split
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.weak_data import WeakData, weak_data
 from ferryid.models.forces import ACCELERATIONS
 from ferryid.regression import CrossProducts
-from ferryid.types import AXES, Floats
+from ferryid.types import AXES, Flags, Floats, Ints
 from ferryid.vessel.profile import Profile
 
 
@@ -35,17 +35,21 @@ class ForceResponse:
         Its standard deviation, shape (3,).
     sigmas
         Standard deviations beyond which a response is no chance, more for fewer windows, shape (3,).
+    possible
+        Whether an inertia that a hull can have explains the response but for its sign, by the windows alone, shape (3,). It
+        does not where a controller's answer to the motion is taken for its cause, or the unit of the force is wrong.
     """
 
     response: Floats
     spread: Floats
     sigmas: Floats
+    possible: Flags
 
     @property
     def reversed(self) -> Floats:
         """The response on axes on which it goes against the force by as much as a reversed sign gives, NaN elsewhere, (3,)."""
         against = (self.response < -IDENTIFY.opposite) & (self.response < -self.sigmas * self.spread)
-        return np.where(against, self.response, np.nan)
+        return np.where(against & self.possible, self.response, np.nan)
 
 
 def force_response(data: LogData) -> ForceResponse | None:
@@ -72,25 +76,56 @@ def force_response(data: LogData) -> ForceResponse | None:
 def _estimated(weak: WeakData) -> ForceResponse:
     from scipy.special import ndtr, stdtrit
 
+    level = float(ndtr(IDENTIFY.wrong_way_sigmas))
     terms = weak.functions.terms
     mask = without_inertia(weak.functions.mask, terms, weak.without_force)
-    squares, products = CrossProducts.of(*weak.whitened.rows).centred()[:2]
     windows = sum(len(one) for one in weak.windows.training)
     response, spread, sigmas = np.full(3, np.nan), np.full(3, np.nan), np.full(3, np.nan)
+    possible = np.zeros(3, dtype=bool)
+    largest = relative_inertia(weak.profile, weak.windows.base_mass) / IDENTIFY.least_inertia
     for axis, name in enumerate(ACCELERATIONS):
         own, place = np.flatnonzero(mask[:, axis]), terms.index(name)
         if place not in own:
             continue
-        variance, at = weak.whitening.sigma[axis] ** 2, int(np.searchsorted(own, place))
-        covariance = np.linalg.pinv(weak.information[axis][np.ix_(own, own)], hermitian=True)
+        at = int(np.searchsorted(own, place))
+        prior = np.nan_to_num((weak.prior_factor * weak.prior_spread[own, axis]) ** -2.0)
+        response[axis], spread[axis], free = _response(weak, axis, own, at, prior, windows)
+        sigmas[axis] = float(stdtrit(free, level))
+        prior[at] = 0.0
+        alone, error, free = _response(weak, axis, own, at, prior, windows)
+        possible[axis] = bool(alone + float(stdtrit(free, level)) * error > -largest[axis])
+    return ForceResponse(response, spread, sigmas, possible)
+
+
+def _response(weak: WeakData, axis: int, own: Ints, at: int, prior: Floats, windows: int) -> tuple[float, float, float]:
+    """Return the response of an axis, its standard deviation, and the freedom that the noise is of; NaN without any.
+
+    The noise is what the estimate leaves: the one by which windows are whitened is of a fit that the prior holds back, and
+    larger than the noise where the prior is far off, as with a reversed force.
+
+    Parameters
+    ----------
+    weak, axis
+        The windows, and the axis.
+    own, at
+        Its k functions, and the place of its acceleration among them.
+    prior
+        Inverse variances of the gains, shape (k,).
+    windows
+        Number of windows.
+    """
+    squares, products, outputs = CrossProducts.of(*weak.whitened.rows).centred()[:3]
+    X, Xy, yy = squares[np.ix_(own, own)], products[own, axis], outputs[axis, axis]
+    variance = float(weak.whitening.sigma[axis] ** 2)
+    for _ in range(IDENTIFY.expectation_steps):
+        covariance = np.linalg.pinv(X / variance + np.diag(prior), hermitian=True)
+        gains = covariance @ Xy / variance
         # Of the functions, as many as the prior leaves to the windows take their freedom.
-        free = windows - float(np.sum(covariance * squares[np.ix_(own, own)])) / variance
+        free = windows - float(np.sum(covariance * X)) / variance
         if free < 1.0:
-            continue
-        response[axis] = 1.0 - covariance[at] @ products[own, axis] / variance
-        spread[axis] = np.sqrt(max(covariance[at, at], 0.0) * windows / free)
-        sigmas[axis] = stdtrit(free, ndtr(IDENTIFY.wrong_way_sigmas))
-    return ForceResponse(response, spread, sigmas)
+            return np.nan, np.nan, np.nan
+        variance = max(float(yy - 2.0 * gains @ Xy + gains @ X @ gains) / free, IDENTIFY.no_force**2)
+    return float(1.0 - gains[at]), float(np.sqrt(max(covariance[at, at], 0.0))), free
 
 
 def refuse_reversed_forces(data: LogData) -> str:
