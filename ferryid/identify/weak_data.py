@@ -366,11 +366,17 @@ class WeakData(LogData):
         return float(np.clip(factor, 1.0, IDENTIFY.widest_prior))
 
     def _prior(self, sigma: Floats, share: float = 1.0, factor: float = 1.0) -> CrossProducts:
-        """Return the prior as observations of zero: a pair a function, whose mean is none, and of which no intercept comes."""
+        """Return the prior as observations of zero: a pair a function, whose mean is none, and of which no intercept comes.
+
+        Axes of the same functions share them, so that a function has one weight: the mean of the axes', and of an acceleration
+        that of its own axis. Coupling is known to be small, and a mean with it would pull the inertia towards the base model's.
+        """
         terms, mask = self.functions.terms, self.functions.mask
         with np.errstate(divide="ignore"):
             weights = np.where(mask & np.isfinite(self.prior_spread), sigma / (factor * self.prior_spread), np.nan)
-        # Axes share their factors: one weight a function.
+        for axis, name in enumerate(ACCELERATIONS):
+            if name in terms and np.isfinite(weights[place := terms.index(name), axis]):
+                weights[place] = weights[place, axis]
         some = np.isfinite(weights).any(axis=1)
         logs = np.where(np.isfinite(weights), np.log(np.where(weights > 0.0, weights, 1.0)), 0.0).sum(axis=1)
         weight = np.where(some, np.exp(logs / np.maximum(np.isfinite(weights).sum(axis=1), 1)), 0.0)

@@ -163,7 +163,7 @@ def test_without_noise_the_hull_comes_back() -> None:
 def test_a_steady_force_in_one_log_does_not_end_up_in_the_hull() -> None:
     def breeze(made: Motion) -> Floats:
         psi = made.eta[:, 2]
-        return np.column_stack([-60.0 * np.cos(psi), 60.0 * np.sin(psi), np.zeros(len(psi))])
+        return np.column_stack([-200.0 * np.cos(psi), 200.0 * np.sin(psi), np.zeros(len(psi))])
 
     logs = [measured(seed, seconds=400.0, jitter=0.02, force=breeze if seed == 0 else None) for seed in range(3)]
     data = data_of(logs, delta=0.8, sigma=0.8)
@@ -351,6 +351,28 @@ def test_an_estimator_that_physics_rejects_gives_way_to_one_that_errs_little_mor
     assert data.name == chosen
     assert {one.name: (one.folds, one.possible) for one in scores} == told
     assert [one.name for one in scores if one.chosen] == [chosen]
+
+
+def test_the_prior_of_an_inertia_is_that_of_its_own_axis() -> None:
+    """Sway and yaw share their functions, and coupling is held far more tightly than the inertia: it was its prior as well."""
+    data = data_of([measured(1, jitter=0.02)], delta=0.4, sigma=0.4)
+    sigma = np.array([5.0, 6.0, 7.0])
+    Sxx = data._prior(sigma).centred()[0]
+    for axis, name in enumerate(ACCELERATIONS):
+        place = data.functions.terms.index(name)
+        assert Sxx[place, place] == pytest.approx((sigma[axis] / data.prior_spread[place, axis]) ** 2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("delta", [0.4, 1.4])
+def test_a_base_model_that_is_far_off_does_not_pull_the_inertia(delta: float) -> None:
+    ratios = []
+    for seed in range(6):
+        data = data_of([measured(seed, seconds=600.0, jitter=0.02, noise=60.0)], delta=delta, sigma=delta)
+        found = data.combined(estimate_correction(data, data.components(), 1, no_progress).coefficients)
+        mass = effective_mass(PROFILE, data.settings.scale, data.functions.terms, found.theta)
+        ratios.append(np.diag(mass) / np.diag(PROFILE.hull.M))
+    np.testing.assert_allclose(np.mean(ratios, axis=0), 1.0, atol=0.02)
 
 
 def test_one_actuator_is_not_exchanged_for_another() -> None:
