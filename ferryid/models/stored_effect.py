@@ -71,6 +71,11 @@ class StoredEffect:
         return self.effect, self.instance
 
     @property
+    def confirmed(self) -> bool:
+        """Whether a log shows it by more than a hint: with a probability of more than one half."""
+        return any(one.probability > 0.5 for one in self.sources)
+
+    @property
     def values(self) -> dict[str, float]:
         """Parameters without their intervals."""
         return {name: one.value for name, one in self.parameters.items()}
@@ -98,7 +103,8 @@ class StoredEffect:
         }
         onset_s, offset_s = self.onset_in(sha256), self.offset_in(sha256)
         when = timed(onset_s if onset_s > 0.0 else None, offset_s if math.isfinite(offset_s) else None)
-        return effect.says(told, self.instance) + (f" It {when}." if when else "")
+        hint = "" if self.confirmed else " It is a hint."
+        return effect.says(told, self.instance) + (f" It {when}." if when else "") + hint
 
 
 @dataclass(frozen=True)

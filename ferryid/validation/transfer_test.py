@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
 from ferryid.models import Conditions, Model, StoredEffect, force_scores, usable_rows
-from ferryid.models.prediction import FreeRun, Prediction, predict
+from ferryid.models.prediction import FreeRun, Prediction, predict, predicted_acceleration
 from ferryid.models.store import load_file
 from ferryid.regression import window_rows, window_starts, window_sums, window_weights
 from ferryid.signals.prepare import Prepared
@@ -42,8 +42,10 @@ def transfer_test(
 ) -> TransferResult:
     """Score the base model, a diagnosed one and every rival on another log of the truth that they were fitted to.
 
-    All predict the same: the force that the thrusters must have given for the measured motion, and where the vessel goes in
-    60 s under the measured forces. The free runs of all take forces from outside as they were along the measured path.
+    All predict the same: the force that the thrusters must have given for the measured motion, the acceleration under the
+    measured forces, and where the vessel goes in 60 s under them. The free runs of all take forces from outside as they were
+    along the measured path. In windows the error is the acceleration's times the mass in the profile, the same for all: a
+    model that takes the thrusters for half as strong and the hull for half as heavy moves alike, with half the force error.
 
     Parameters
     ----------
@@ -97,7 +99,9 @@ def transfer_test(
     length_s = window_seconds(profile)
 
     def in_windows(prediction: Prediction) -> Floats:
-        return window_errors(motion.tau - prediction.tau, rows, motion.rate_hz, length_s)
+        seen = prediction.motion
+        errors = (seen.nu_dot - predicted_acceleration(prediction.force, seen)) @ profile.hull.M.T
+        return window_errors(errors, rows, motion.rate_hz, length_s)
 
     base_windows = _power(in_windows(base))
     scores = {name: _score(motion.tau, base.tau, found.get(name), rows, base_run, more) for name, more in known.items()}

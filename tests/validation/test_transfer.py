@@ -74,7 +74,21 @@ def _refuses(log: str, profile: Profile, out: Path) -> LearnedModel:
 def _shifted(prepared: Prepared) -> Prediction:
     """Return the base model's prediction with twice its error: four times the mean square."""
     found = _base(prepared)
-    return replace(found, tau=prepared.motion.tau - 2.0 * (prepared.motion.tau - found.tau))
+    error = prepared.motion.tau - found.tau
+    motion = replace(found.motion, tau=found.motion.tau + error)
+    return replace(found, tau=prepared.motion.tau - 2.0 * error, motion=motion)
+
+
+def _halved(prepared: Prepared) -> Prediction:
+    """Return the base model with half the thrust and half the hull: it moves alike, with half the force error."""
+    found = _base(prepared)
+
+    def force(nu_dot: Floats, nu: Floats, *rest: Any) -> Floats:
+        return np.asarray(0.5 * found.force(nu_dot, nu, *rest))
+
+    error = prepared.motion.tau - found.tau
+    motion = replace(found.motion, tau=0.5 * found.motion.tau)
+    return Prediction(prepared.motion.tau - 0.5 * error, motion, force)
 
 
 def _unstable(prepared: Prepared) -> Prediction:
@@ -98,6 +112,7 @@ def _weightless(prepared: Prepared) -> Prediction:
 RIVALS = {
     "blank": _rival(_base),
     "twice": _rival(_shifted),
+    "halved": _rival(_halved),
     "unstable": _rival(_unstable),
     "weightless": _rival(_weightless),
     "refuses": _refuses,
@@ -123,6 +138,13 @@ def test_twice_the_error_is_four_times_its_square(scored: TransferResult) -> Non
     assert scored.methods["twice"].mse == pytest.approx({"surge": 4.0, "sway": 4.0, "yaw": 4.0})
     assert scored.methods["twice"].windows == pytest.approx({"surge": 4.0, "sway": 4.0, "yaw": 4.0})
     assert scored.methods["refuses"].windows == {}
+
+
+def test_half_the_thrust_on_half_the_hull_predicts_no_better(scored: TransferResult) -> None:
+    halved = scored.methods["halved"]
+    assert halved.mse == pytest.approx({"surge": 0.25, "sway": 0.25, "yaw": 0.25})
+    assert halved.windows == pytest.approx({"surge": 1.0, "sway": 1.0, "yaw": 1.0})
+    assert halved.position_m == pytest.approx(scored.base.position_m)
 
 
 def test_noise_of_the_acceleration_averages_out_over_windows(scored: TransferResult) -> None:

@@ -19,7 +19,7 @@ from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.campaign import JudgedCampaign
 from ferryid.diagnose.judging.campaign_posterior import campaign_posterior
 from ferryid.diagnose.judging.claims import Claim, Key, LogFigures
-from ferryid.diagnose.judging.confidence_rules import apply_rules, lasting, log_notes
+from ferryid.diagnose.judging.confidence_rules import apply_rules, lasting, log_notes, predictive
 from ferryid.diagnose.judging.credibility import RefittedHull, impossible_throughout, refitted_hull
 from ferryid.diagnose.judging.detection_power import (
     detection_powers,
@@ -176,7 +176,7 @@ def _concluded(
         weighed=shared.weighed,
         common_hull_doubt=shared.common_hull_doubt,
     )
-    findings, rule_notes, posterior = _confident(claims, figures, log)
+    findings, rule_notes, posterior, wider = _confident(claims, figures, log)
     chances, still = detection_powers(problem, kept, selected.steady), unexcited_axes(problem)
     before, after = _scores(problem, log.base, kept, stands.proof)
     mse = after["mse"]
@@ -224,6 +224,7 @@ def _concluded(
         duration_s=_duration_s(screened),
         left_out=survey.motion.left_out,
         posterior=posterior,
+        wider=None if together is not None else wider,
         remainder=remainder,
         least_sizes=least_sizes(problem, kept, chances, {one.key for one in findings}),
     )
@@ -231,8 +232,8 @@ def _concluded(
 
 def _confident(
     claims: Sequence[Claim], figures: LogFigures, log: JudgedLog
-) -> tuple[tuple[Finding, ...], tuple[str, ...], Posterior | None]:
-    """Return findings as the confidence rules leave them, notes, and the posterior that the sure ones lead to.
+) -> tuple[tuple[Finding, ...], tuple[str, ...], Posterior | None, Posterior | None]:
+    """Return findings as the confidence rules leave them, notes, and the posteriors of the sure ones and of those that predict.
 
     The hull is refitted beside the sure findings alone. Where nobody modelled it and no axis has an inertia that is possible
     then, the doubtful ones had made up for forces that are not the vessel's, and the sure ones rest on the same forces.
@@ -240,12 +241,17 @@ def _confident(
     selected = log.selected
     problem, screened = selected.search.problem, selected.estimated.averaged.screened
 
-    def judged() -> tuple[tuple[Finding, ...], tuple[str, ...], Posterior | None]:
+    def judged() -> tuple[tuple[Finding, ...], tuple[str, ...], Posterior | None, Posterior | None]:
         findings, notes = apply_rules(claims, figures)
         if not selected.estimated.baseline.updates_model:
-            return findings, notes, None
+            return findings, notes, None, None
         survey, states, known = screened.measured.survey, selected.search.states, figures.hull_known
-        return findings, notes, posterior_of(problem, log.stands.fit, states, findings, survey, known=known)
+        sure = posterior_of(problem, log.stands.fit, states, findings, survey, known=known)
+        more = predictive(claims, figures) - {one.key for one in findings if one.sure}
+        wider = None
+        if more:
+            wider = posterior_of(problem, log.stands.fit, states, findings, survey, known=known, predictive=more)
+        return findings, notes, sure, wider
 
     first = judged()
     hull = None if first[2] is None else first[2].hull

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from ferryid.counts import counted
 from ferryid.diagnose.inference.feedback import OUT_OF_STEP
 from ferryid.diagnose.inference.thresholds import INFERENCE
-from ferryid.diagnose.judging.claims import Claim, Figures, LogFigures
+from ferryid.diagnose.judging.claims import Claim, Figures, Key, LogFigures
 from ferryid.diagnose.judging.experiment_design import CALM, HULL_FIRST, fitting
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.thresholds import JUDGING
@@ -46,6 +46,8 @@ class ConfidenceRule:
         Where it begins to apply; None where a fact decides and no figure.
     judge
         ``judge(finding, context, threshold)`` returns the finding and a note.
+    of_name
+        True where it doubts which effect it is that acts, not that predictions with it are better.
     """
 
     name: str
@@ -53,17 +55,19 @@ class ConfidenceRule:
     threshold: float | None
     unit: str
     judge: Callable[[Finding, Context, float], Outcome]
+    of_name: bool = False
 
     def __call__(self, finding: Finding, context: Context) -> Outcome:
         """Return the finding as it stands by this rule, None where it is dropped, and a note."""
         return self.judge(finding, context, 0.0 if self.threshold is None else self.threshold)
 
 
-def rule(threshold: float | None = None, unit: str = "") -> Callable[..., ConfidenceRule]:
+def rule(threshold: float | None = None, unit: str = "", *, of_name: bool = False) -> Callable[..., ConfidenceRule]:
     """Make a rule of a function, with its name and the first line of its docstring."""
 
     def made(judge: Callable[[Finding, Context, float], Outcome]) -> ConfidenceRule:
-        return ConfidenceRule(judge.__name__, (judge.__doc__ or "").partition("\n")[0], threshold, unit, judge)
+        about = (judge.__doc__ or "").partition("\n")[0]
+        return ConfidenceRule(judge.__name__, about, threshold, unit, judge, of_name)
 
     return made
 
@@ -201,7 +205,7 @@ def worse_on_an_axis(finding: Finding, context: Context, threshold: float) -> Ou
     )
 
 
-@rule(JUDGING.least_removed, "of the held-out squared force error")
+@rule(JUDGING.least_removed, "of the held-out squared force error", of_name=True)
 def removes_little(finding: Finding, context: Context, threshold: float) -> Outcome:
     """Lower what removes less than this on every axis while it acts: hull and formulas may be as much off."""
     removed = context.own.removed
@@ -213,7 +217,7 @@ def removes_little(finding: Finding, context: Context, threshold: float) -> Outc
     )
 
 
-@rule()
+@rule(of_name=True)
 def less_than_is_unexplained(finding: Finding, context: Context, _threshold: float) -> Outcome:
     """Lower what explains less, on every axis, than a force without a name that is left: it may stand in for that force."""
     removed, left = context.own.removed, unexplained_shares(context)
@@ -245,7 +249,7 @@ def unexplained_shares(context: Context) -> dict[str, float]:
     return {axis: max(0.0, *(one.improvement[axis] if described else 1.0 for one in slow)) for axis in AXES if slow}
 
 
-@rule()
+@rule(of_name=True)
 def hull_from_this_log(finding: Finding, context: Context, _threshold: float) -> Outcome:
     """Lower forces where the hull is known from nothing but the log that shows them.
 
@@ -295,7 +299,7 @@ def pose_jumps(finding: Finding, context: Context, _threshold: float) -> Outcome
     return (lowered(finding) if context.log.jumping and judged else finding), ""
 
 
-@rule(JUDGING.reaction_share, "of the held-out squared force error")
+@rule(JUDGING.reaction_share, "of the held-out squared force error", of_name=True)
 def out_of_step_beside_disturbance(finding: Finding, context: Context, threshold: float) -> Outcome:
     """Lower a delay or lag beside unmeasured disturbances, unless it removes this much on an axis or no controller answers.
 
@@ -407,6 +411,24 @@ def apply_rules(
         notes += [note for _, _, note in judged if note]
         beside = tuple(replace(claim, finding=finding) for claim, finding, _ in judged if finding is not None)
     return tuple(one.finding for one in beside), tuple(notes)
+
+
+def predictive(claims: Sequence[Claim], log: LogFigures) -> frozenset[Key]:
+    """Return the forces whose doubts are about their name alone: predictions with them hold on stretches kept from the fit.
+
+    Parameters
+    ----------
+    claims, log
+        As of `apply_rules`.
+    """
+    # What else may be in its place decides its probability; either predicts.
+    named = [
+        replace(one, finding=replace(one.finding, probability=1.0)) if one.figures.kind == "force" else one
+        for one in claims
+    ]
+    findings, _ = apply_rules(named, log, [one for one in RULES if not one.of_name])
+    forces = {one.finding.key for one in claims if one.figures.kind == "force"}
+    return frozenset(one.key for one in findings if one.sure and one.key in forces)
 
 
 def log_notes(log: LogFigures) -> list[str]:

@@ -104,6 +104,8 @@ class Diagnosis:
         `ferryid.diagnose.inference.simulation_baseline.simulation_as_json` gives it, or empty.
     posterior
         What a model can learn from it; None where it found no force left out, or was held against a simulation.
+    wider
+        The same with the effects of whose name alone it is in doubt; None where there are none, and in a campaign.
     located
         Where and when the recording and the model differ.
     moved
@@ -150,6 +152,7 @@ class Diagnosis:
     withheld: tuple[Withheld, ...] = ()
     against: Mapping[str, Any] = field(default_factory=dict)
     posterior: Posterior | None = None
+    wider: Posterior | None = None
     located: Location | None = None
     moved: HullChange | None = None
     duration_s: float | None = None

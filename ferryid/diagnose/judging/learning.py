@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import isfinite, nan
 
 import numpy as np
 
 from ferryid.diagnose.judging.thresholds import JUDGING
+from ferryid.effects import effects
+from ferryid.effects.wording import listed, titled
 from ferryid.errors import FerryIdError
 from ferryid.identify import (
     Acceptance,
@@ -20,7 +23,7 @@ from ferryid.identify import (
     prediction_errors,
     with_remainder,
 )
-from ferryid.models import ForceScores, Model, ModelScores, blank_model
+from ferryid.models import ForceScores, Model, ModelScores, StoredEffect, blank_model
 from ferryid.side_by_side import over
 from ferryid.types import AXES, Flags, Floats, RunContext, by_axis
 from ferryid.vessel.profile import Profile
@@ -45,6 +48,8 @@ class Learned:
     over_fit
         That of the model that is stored over that of ``ferryid fit`` alone, by axis; empty where it is the model of the fit, or
         none.
+    with_hints
+        True where effects of whose name the diagnosis is in doubt are in the model, as predictions with them are better.
     """
 
     accepted: bool
@@ -52,6 +57,7 @@ class Learned:
     reasons: tuple[str, ...] = ()
     ratio: Mapping[str, float] | None = None
     over_fit: Mapping[str, float] | None = None
+    with_hints: bool = False
 
     def to_json(self) -> dict[str, object]:
         """Return it as plain values."""
@@ -61,6 +67,7 @@ class Learned:
             "reasons": list(self.reasons),
             "per_axis": dict(self.ratio or {}),
             "over_fit": dict(self.over_fit or {}),
+            "with_hints": self.with_hints,
         }
 
 
@@ -96,7 +103,7 @@ class Learner:
     run: RunContext
     settings: FitSettings = field(default_factory=FitSettings)
 
-    def learn(self, diagnosed: Model | None, name: str) -> tuple[Model | None, Learned]:
+    def learn(self, diagnosed: Model | None, name: str, wider: Model | None = None) -> tuple[Model | None, Learned]:
         """Return the model to store, and what was learned; logs that cannot be fitted leave the model as it is.
 
         Parameters
@@ -105,15 +112,51 @@ class Learner:
             The model with the findings; None where there are none.
         name
             Name of a model where there is none yet.
+        wider
+            The same with effects that are hints; None where there are none. Stored where it predicts better.
         """
         self.run.progress("learning what is left")
         try:
             if diagnosed is None and self.start is None:
-                return self._fitted(name)
-            base = diagnosed or replace(self._known_start(), name=name)
-            return self._on_top(base, diagnosed)
+                found = self._fitted(name)
+            else:
+                found = self._on_top(diagnosed or replace(self._known_start(), name=name), diagnosed)
+            return found if wider is None else self._with_hints(wider, *found)
         except FerryIdError as error:
             return diagnosed, Learned(False, f"Nothing was learned beside the findings: {error}")
+
+    def _with_hints(self, wider: Model, model: Model | None, learned: Learned) -> tuple[Model | None, Learned]:
+        """Return a model with effects that are hints where it predicts better than the one without them, else that one."""
+        start = self.start or blank_model(self.profile, wider.name)
+        # A hull that was refitted to all rows has seen those that decide here.
+        unseen = replace(wider, hull=start.hull)
+        try:
+            found = self._remainder(unseen)
+        except FerryIdError:
+            return model, learned
+        rows = [a.validation & b.validation for a, b in zip(self._plain.logs, found.outcome.logs, strict=True)]
+        compared = [start, model or start, self._plain.model, unseen, found.model]
+        base, without, fitted, bare, after = self._errors(compared, rows)
+        verdict, change = _judged(found.outcome, bare, after), _over(after, without)
+        if not (verdict.accepted and float(np.mean(change)) < 1.0 - JUDGING.reported_change):
+            return model, learned
+        if self.start is not None or self.profile.hull.has_model:
+            # About a hull that is known the refitted one, to all rows and with the noise's colour, is the better estimate.
+            stored, _ = self._on_top(wider, wider)
+        else:
+            stored = replace(found.model, accepted=True, scores=_scores(base, after, found.outcome))
+        hints = [titled(effects()[one.effect].title, one.instance) for one in _effects(wider) if not one.confirmed]
+        says = (
+            f"{listed(hints)} {'is a hint' if len(hints) == 1 else 'are hints'} and part of the model all the same, which "
+            f"predicts better so; held-out squared prediction error against the model without: {_changes(by_axis(change))}."
+        )
+        over_fit = by_axis(_over(after, fitted))
+        return stored, Learned(True, says, verdict.reasons, by_axis(change), over_fit, with_hints=True)
+
+    @cached_property
+    def _plain(self) -> FitOutcome:
+        """The fit alone."""
+        return fit_logs(self.paths, self.profile, self.settings, self.run, name=self.profile.name)
 
     def _known_start(self) -> Model:
         assert self.start is not None
@@ -121,12 +164,14 @@ class Learner:
 
     def _fitted(self, name: str) -> tuple[Model | None, Learned]:
         """Return what a fit alone makes of the logs, of which nothing was named."""
-        found = fit_logs(self.paths, self.profile, self.settings, self.run, name=name)
+        found = self._plain
         ratio, accepted = found.acceptance.per_axis, found.acceptance.accepted
         said = _says(
             "No named effect enters the model. A correction of the hull", ratio, found.acceptance, "the profile's hull"
         )
-        return (found.model if accepted else None), Learned(accepted, said, found.acceptance.reasons, ratio)
+        return (replace(found.model, name=name) if accepted else None), Learned(
+            accepted, said, found.acceptance.reasons, ratio
+        )
 
     def _on_top(self, base: Model, diagnosed: Model | None) -> tuple[Model | None, Learned]:
         """Return the model to store: what is examined or diagnosed, with a correction where that is accepted."""
@@ -165,7 +210,7 @@ class Learner:
 
         def make(alone: bool) -> None:
             if alone:
-                plain.append(fit_logs(self.paths, self.profile, self.settings, self.run, name=base.name))
+                plain.append(self._plain)
             else:
                 left.append(self._remainder(base))
 
@@ -183,6 +228,11 @@ class Learner:
 def without_withheld(profile: Profile, withhold: Sequence[str]) -> Profile:
     """Return a profile that does not map what is hidden from a diagnosis."""
     return replace(profile, signals=tuple(one for one in profile.signals if one.quantity not in withhold))
+
+
+def _effects(model: Model) -> list[StoredEffect]:
+    """Return the effects of a model, the vessel's and the conditions of its logs."""
+    return [*model.vessel_effects, *(one for log in model.conditions for one in log.effects)]
 
 
 def _judged(found: FitOutcome, without: Floats, after: Floats) -> Acceptance:
@@ -219,12 +269,15 @@ def _over(one: Floats, other: Floats) -> Floats:
     return ratio
 
 
+def _changes(ratio: Mapping[str, float]) -> str:
+    """Return by how much an error changes on each axis."""
+    known = [f"{axis} {100.0 * (ratio[axis] - 1.0):+.0f} %" for axis in AXES if isfinite(ratio.get(axis, nan))]
+    return ", ".join(known) or "unknown"
+
+
 def _says(what: str, ratio: Mapping[str, float], verdict: Acceptance, base: str) -> str:
     """Return in one line what was learned, or why it was not accepted."""
-    change = ", ".join(
-        f"{axis} {100.0 * (ratio[axis] - 1.0):+.0f} %" for axis in AXES if isfinite(ratio.get(axis, nan))
-    )
-    told = f"held-out squared prediction error against {base}: {change or 'unknown'}"
+    told = f"held-out squared prediction error against {base}: {_changes(ratio)}"
     if verdict.accepted:
         return f"{what} is part of the model; {told}."
     reasons = [one.removeprefix(PREFIX) for one in verdict.reasons if one.startswith(PREFIX)]

@@ -64,7 +64,11 @@ def store_updated_model(
     made, notes = update_model(diagnoses, profile, model, name)
     learned = None
     if learner is not None:
-        made, learned = learner.learn(made, name)
+        wide = [replace(one, posterior=one.wider or one.posterior) for one in diagnoses]
+        wider, more = update_model(wide, profile, model, name) if wide != list(diagnoses) else (None, ())
+        made, learned = learner.learn(made, name, wider)
+        if learned.with_hints:
+            diagnoses, notes = wide, more
         notes = (*notes, learned.says)
         diagnoses = [replace(one, learned=learned) for one in diagnoses]
         if made is not None and not (learned.accepted or made.hull or made.terms or profile.hull.has_model):
@@ -80,7 +84,7 @@ def store_updated_model(
     if made is not None:
         with alone(out / "models"):
             path = str(save(made, out).path)
-    everywhere = learned is not None and learned.accepted
+    everywhere = learned is not None and (learned.accepted or learned.with_hints)
     return tuple(
         replace(
             one,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, nan
 
@@ -12,6 +12,7 @@ from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.data.measurements import Survey
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, effect_slopes, fit
 from ferryid.diagnose.inference.stochastic_disturbance import DisturbanceState
+from ferryid.diagnose.judging.claims import Key
 from ferryid.diagnose.judging.credibility import IN_THE_HULL, refitted_hull
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.effects.force_model import COEFFICIENTS
@@ -74,6 +75,7 @@ def posterior_of(
     survey: Survey,
     *,
     known: bool = True,
+    predictive: Collection[Key] = (),
 ) -> Posterior | None:
     """Return what a log teaches; None where no force was left out that is more likely than not.
 
@@ -89,9 +91,12 @@ def posterior_of(
         Of the log.
     known
         Whether the hull comes from a profile or a model.
+    predictive
+        Effects that enter though they are doubtful.
     """
     reported = {(one.effect, one.instance): one for one in findings}
-    accepted = [i for i, one in enumerate(kept.candidates) if one.key in reported and reported[one.key].sure]
+    enters = {key for key, one in reported.items() if one.sure or key in predictive}
+    accepted = [i for i, one in enumerate(kept.candidates) if one.key in enters]
     if not accepted:
         return None
     notes = [

@@ -30,7 +30,11 @@ from ferryid.diagnose.judging.confidence_rules import (
     out_of_step_beside_disturbance,
     passes_by_little,
     place_visited_once,
+<<<<<<< HEAD
     pose_jumps,
+=======
+    predictive,
+>>>>>>> 34c4f4f8 (Diagnosis: hints whose name alone is in doubt enter the model where held-out predictions are better with them; second logs compared by the acceleration's error on one mass)
     removes_little,
     too_brief,
     unexplained_shares,
@@ -343,3 +347,24 @@ def test_no_rule_raises_a_probability_and_dropped_findings_are_gone() -> None:
         (only,), _ = apply_rules(claims, LogFigures(hull_known=False, velocity_noise={"yaw": 1.0}))
         assert only.effect == "wind"
         assert only.probability == min(probability, JUDGING.hint_probability)
+
+
+def test_a_hint_for_its_name_alone_predicts() -> None:
+    delay, lag, load = (found(one) for one in ("time_delay", "thruster_lag", "payload"))
+    claims = [
+        Claim(delay, Figures("force", score=50.0)),
+        # Not likelier than another in its place: either predicts.
+        Claim(replace(lag, probability=0.2), Figures("force", score=50.0)),
+        Claim(load, Figures("force", score=50.0, doubt="it weighs more than the vessel")),
+        Claim(found("yaw_rate_scale"), Figures("sensor")),
+        Claim(found("gusts"), Figures("disturbance")),
+    ]
+    log = LogFigures(unsteady=True)
+    findings, _ = apply_rules(claims, log)
+    assert not any(one.sure for one in findings if one.effect in ("time_delay", "thruster_lag", "payload"))
+    assert predictive(claims, log) == {("time_delay", None), ("thruster_lag", None)}
+
+
+def test_a_hint_of_an_axis_that_gets_worse_does_not_predict() -> None:
+    worse = Claim(replace(found("time_delay"), improvement={"yaw": -0.5}), Figures("force", score=50.0))
+    assert not predictive([worse], LogFigures(unsteady=True))

@@ -142,7 +142,7 @@ def test_what_sets_in_is_a_hint_where_the_hull_beside_the_sure_findings_cannot_b
     selected = SimpleNamespace(search=SimpleNamespace(problem=None, states=()), estimated=estimated)
     log = SimpleNamespace(selected=selected, stands=SimpleNamespace(fit=None))
     claim = Claim(found("thruster_gain"), Figures("force", sets_in=True))
-    (one,), notes, made = conclude._confident([claim], LogFigures(hull_known=known), cast(Any, log))
+    (one,), notes, made, _ = conclude._confident([claim], LogFigures(hull_known=known), cast(Any, log))
     assert (one.sure, made is not None) == (sure, sure)
     assert any("which no hull has" in note for note in notes) != sure
 

@@ -237,6 +237,44 @@ def test_where_nothing_is_named_the_model_is_the_fits(windy: tuple[str, Model], 
     )
 
 
+def hinted(log: str, folder: Path, north: float, east: float) -> Model:
+    """Return a model with a wind in a log that is but a hint."""
+    wind = named(prepare_sha256(log, folder), north=north, east=east)
+    wind = replace(wind, sources=tuple(replace(one, probability=0.4) for one in wind.sources))
+    blank = replace(blank_model(FERRY, "ferry"), hull=hull_of_ferry())
+    return replace(blank, conditions=(Conditions(Path(log).stem, wind.sources[0].sha256, (wind,)),))
+
+
+def test_a_hint_that_predicts_is_part_of_the_model(windy: tuple[str, Model], folder: Path) -> None:
+    wider = hinted(windy[0], folder, -3.0, 2.0)
+    stored, learned = Learner((windy[0],), FERRY, None, RunContext(folder), QUICK).learn(None, "ferry", wider)
+    assert learned.with_hints
+    assert learned.accepted
+    assert learned.says.startswith(
+        "Steady wind is a hint and part of the model all the same, which predicts better so;"
+    )
+    assert stored is not None
+    (conditions,) = stored.conditions
+    assert [one.effect for one in conditions.effects] == ["wind"]
+    assert conditions.effects[0].says().endswith(" It is a hint.")
+    assert not windy[1].conditions[0].effects[0].says().endswith("a hint.")
+    # Of a fit alone, which knows no wind's mean for all rows, the error is larger.
+    assert learned.over_fit is not None
+    assert float(np.mean(list(learned.over_fit.values()))) < 1.0
+
+
+def test_a_hint_that_does_not_predict_stays_out(windy: tuple[str, Model], folder: Path) -> None:
+    wider = hinted(windy[0], folder, 3.0, -2.0)
+    learner = Learner((windy[0],), FERRY, None, RunContext(folder), QUICK)
+    without, plain = learner.learn(None, "ferry")
+    stored, learned = learner.learn(None, "ferry", wider)
+    assert (learned, learned.with_hints) == (plain, False)
+    assert stored is not None
+    assert without is not None
+    assert stored.conditions == ()
+    np.testing.assert_array_equal(stored.theta, without.theta)
+
+
 def test_a_log_that_cannot_be_fitted_leaves_the_model_as_it_is(folder: Path) -> None:
     model = replace(blank_model(FERRY, "ferry"), hull=hull_of_ferry())
     short = sailed(folder, "short", f"duration_s = 15\n{TWELVE}", 5)
