@@ -126,9 +126,11 @@ def section(found: Sequence[Mapping[str, Any]]) -> list[str]:
     lines = [
         "\n## Second logs of the proof\n",
         f"{counted(len(results), 'case')} of `ferryid prove` (seed {SEED}), each learnt from its first log and judged on its "
-        "second. *Force*: squared force error, averaged over windows as `fit` is judged, over the base model's, mean of the "
-        f"axes. *Row by row*: the same with the noise of velocities smoothed over {WINDOW_S:g} s in it, which is most of it; "
-        "thesis and stepwise regression are fitted to rows with that very noise. *Position*: of free runs after 60 s over the "
+        "second. *Force*: squared error of the acceleration, averaged over windows and as a force on the mass in the profile, "
+        "as `fit` is judged, over the base model's, mean of the axes. *Row by row*: squared error of the thrust that the "
+        f"motion must have taken, with the noise of velocities smoothed over {WINDOW_S:g} s, which is most of it; thesis and "
+        "stepwise regression are fitted to rows with that very noise, and a method that takes thrusters and hull for half as "
+        "strong has half that error with the same motion. *Position*: of free runs after 60 s over the "
         "base model's. All are medians; a model that there is not, or of which a run diverges, counts as infinite. *Best*: "
         f"logs on which it has the least error, or at most {NEAR:g} times that. *Ours over it*: position of the diagnosed "
         "model over that of the other, median. Output error and `fit` have the same terms; sparse regressions choose from "
@@ -157,8 +159,8 @@ def _log_by_log(found: Sequence[Mapping[str, Any]], results: Sequence[TransferRe
     """Return each log: what was concealed, what the diagnosed model has of it, and how this stands beside the best other."""
     lines = [
         "",
-        "Log by log: *in the model* is what the diagnosis was sure of. Errors are those of the diagnosed model over those of "
-        "the best other.",
+        "Log by log: *in the model* are the effects in the stored model, hints that predict among them. Errors are those of "
+        "the diagnosed model over those of the best other.",
         "",
         "| case | concealed | in the model | force | best other | position | best other |",
         "|---|---|---|--:|---|--:|---|",
@@ -177,8 +179,8 @@ def _log_by_log(found: Sequence[Mapping[str, Any]], results: Sequence[TransferRe
             lost, missed = lost + 1, missed + (not set(plain["concealed"]) <= set(known))
     lines += [
         "",
-        f"On {counted(lost, 'log')} another model has the least force error; in {missed} of them the diagnosis was not sure of "
-        "all that was concealed, so that its model leaves it out. Sparse and stepwise regression take what lowers the error.",
+        f"On {counted(lost, 'log')} another model has the least force error; in {missed} of them the diagnosed one lacks some "
+        "of what was concealed. Sparse and stepwise regression take what lowers the error.",
     ]
     return lines
 

@@ -65,7 +65,7 @@ def test_each_log_says_what_was_concealed_and_how_the_diagnosed_model_stands() -
     assert "| wind | wind | nothing | 1.04 | fit | 1.00 | fit |" in lines
     assert "| wind | wind | nothing | 3.00 | stepwise | 1.50 | stepwise |" in lines
     assert lines[-1].startswith(
-        "On 1 log another model has the least force error; in 1 of them the diagnosis was not sure"
+        "On 1 log another model has the least force error; in 1 of them the diagnosed one lacks some"
     )
 
 
