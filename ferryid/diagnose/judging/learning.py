@@ -130,15 +130,17 @@ class Learner:
         start = self.start or blank_model(self.profile, wider.name)
         # A hull that was refitted to all rows has seen those that decide here.
         unseen = replace(wider, hull=start.hull)
+        sure = _confirmed(unseen)
         try:
             found = self._remainder(unseen)
+            beside = self._remainder(sure).model if _effects(sure) else self._plain.model
         except FerryIdError:
             return model, learned
         rows = [a.validation & b.validation for a, b in zip(self._plain.logs, found.outcome.logs, strict=True)]
-        compared = [start, model or start, self._plain.model, unseen, found.model]
+        compared = [start, beside, self._plain.model, unseen, found.model]
         base, without, fitted, bare, after = self._errors(compared, rows)
         verdict, change = _judged(found.outcome, bare, after), _over(after, without)
-        if not (verdict.accepted and float(np.mean(change)) < 1.0 - JUDGING.reported_change):
+        if not (verdict.accepted and accept(without, after, "prediction").accepted):
             return model, learned
         if self.start is not None or self.profile.hull.has_model:
             # About a hull that is known the refitted one, to all rows and with the noise's colour, is the better estimate.
@@ -228,6 +230,16 @@ class Learner:
 def without_withheld(profile: Profile, withhold: Sequence[str]) -> Profile:
     """Return a profile that does not map what is hidden from a diagnosis."""
     return replace(profile, signals=tuple(one for one in profile.signals if one.quantity not in withhold))
+
+
+def _confirmed(model: Model) -> Model:
+    """Return a model without the effects that are hints."""
+    conditions = (replace(log, effects=tuple(one for one in log.effects if one.confirmed)) for log in model.conditions)
+    return replace(
+        model,
+        vessel_effects=tuple(one for one in model.vessel_effects if one.confirmed),
+        conditions=tuple(log for log in conditions if log.effects),
+    )
 
 
 def _effects(model: Model) -> list[StoredEffect]:
