@@ -28,6 +28,8 @@ from tests.bench.trials import ROUND_S, SCALE, VESSEL, written
 
 WORKERS = (1, 2, 4, 8)
 LOGS = 6
+QUICK_S = 180
+"""Length of the shorter logs of a quick run [s]."""
 LONG_S = 3600
 """Length of the longer logs [s], by which the time of a log is split into what its rows take and what it takes without."""
 CASES = ("--only", "short", "--runs", "1", "--seed", "20261128")
@@ -54,10 +56,11 @@ class Traffic:
 
 @dataclass(frozen=True)
 class LogTimes:
-    """What a log takes without its rows, and each row more [s], by logs of up to `rows` rows."""
+    """What a log takes without its rows, and each row more [s], by logs of `least` and of `rows` rows."""
 
     base_s: float
     row_s: float
+    least: float
     rows: float
 
 
@@ -71,12 +74,14 @@ class Measured:
 
 
 def run(quick: bool) -> Section:
-    """Measure; `quick` on one and two workers, with two logs and without the proof, a case of which takes half a minute."""
-    workers, logs, long_s = (WORKERS[:2], 2, 2 * ROUND_S) if quick else (WORKERS, LOGS, LONG_S)
+    """Measure; `quick` on one and two workers, two short logs, and without the proof, whose cases take long."""
+    workers, logs, short_s, long_s = (
+        (WORKERS[:2], 2, QUICK_S, 2 * QUICK_S) if quick else (WORKERS, LOGS, ROUND_S, LONG_S)
+    )
     found = Measured()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        paths = [written(folder, number, ROUND_S) for number in range(logs)]
+        paths = [written(folder, number, short_s) for number in range(logs)]
         recipe = folder / "recipe.toml"
         recipe.write_text(RECIPE, encoding="utf-8")
 
@@ -106,7 +111,7 @@ def run(quick: bool) -> Section:
     rows = [
         row
         for what, times in (
-            (f"batch of {logs} logs of 12 min, with fits", found.batch),
+            (f"batch of {logs} logs of {short_s / 60:g} min, with fits", found.batch),
             ("cases of the proof", found.proof),
         )
         for row in _speed(what, times)
@@ -120,15 +125,15 @@ def run(quick: bool) -> Section:
             found.batch[1] / archive_s,
         )
     )
-    short_rows, long_rows = ROUND_S * RATE_HZ, long_s * RATE_HZ
+    short_rows, long_rows = short_s * RATE_HZ, long_s * RATE_HZ
     slope_s = max((long_log_s - short_log_s) / (long_rows - short_rows), 0.0)
-    log_times = LogTimes(max(short_log_s - slope_s * short_rows, 0.0), slope_s, long_rows)
+    log_times = LogTimes(max(short_log_s - slope_s * short_rows, 0.0), slope_s, short_rows, long_rows)
     curves = [
         Curve(what, "single-thread workers of a Dask cluster", [(float(count), took) for count, took in times.items()])
         for what, times in ((f"batch of {logs} logs", found.batch), ("cases of the proof", found.proof))
         if times
     ]
-    notes = [*_overhead(found, logs), *_moved(moved), *_projected(log_times, found.task, moved, kept)]
+    notes = [*_overhead(found, logs), *_moved(moved, short_s), *_projected(log_times, found.task, moved, kept)]
     return Section("Beyond one machine", rows, notes, ("dask", "distributed"), curves=curves)
 
 
@@ -227,11 +232,11 @@ def _overhead(found: Measured, logs: int) -> Iterator[str]:
     yield f"A task that does nothing takes {each} workers, of {TRIVIAL} sent at once: client, scheduler and worker together."
 
 
-def _moved(moved: Traffic) -> Iterator[str]:
+def _moved(moved: Traffic, log_s: float) -> Iterator[str]:
     yield (
-        f"Moved per log of 12 min: {moved.sent / 1e3:.1f} kB sent to a worker and {moved.returned / 1e3:.1f} kB back, through "
-        f"the scheduler; {moved.read / 1e6:.1f} MB of log read and {moved.written / 1e6:.2f} MB of tables, sums, model and "
-        "page written, through the file system that the workers share."
+        f"Moved per log of {log_s / 60:g} min: {moved.sent / 1e3:.1f} kB sent to a worker and {moved.returned / 1e3:.1f} kB "
+        f"back, through the scheduler; {moved.read / 1e6:.1f} MB of log read and {moved.written / 1e6:.2f} MB of tables, sums, "
+        "model and page written, through the file system that the workers share."
     )
 
 
@@ -241,8 +246,9 @@ def _projected(log: LogTimes, task: dict[int, float], moved: Traffic, kept: Arch
     log_s, task_s = log.base_s + log.row_s * rows, max(task.values())
     yield (
         f"**Projection** to {logs:,} logs and {PROJECTED_ROWS:.0e} rows, {rows / RATE_HZ / 3600:.0f} h at {RATE_HZ:g} Hz each. "
-        f"A log takes {log.base_s:.2g} s and {log.row_s * 1e6:.2g} s per million rows, by logs of {ROUND_S / 60:g} and "
-        f"{log.rows / RATE_HZ / 60:g} min on one worker, so {log_s:.3g} s; all of them {log_s * logs / 3600:.3g} h of one core."
+        f"A log takes {log.base_s:.2g} s and {log.row_s * 1e6:.2g} s per million rows, by logs of {log.least / RATE_HZ / 60:g} "
+        f"and {log.rows / RATE_HZ / 60:g} min on one worker, so {log_s:.3g} s; all of them {log_s * logs / 3600:.3g} h of one "
+        "core."
     )
     each = ", ".join(
         f"{(log_s / count + task_s + kept.log_s) * logs / 60:.3g} min on {count}" for count in (16, 64, 256)
@@ -252,7 +258,7 @@ def _projected(log: LogTimes, task: dict[int, float], moved: Traffic, kept: Arch
         f"{kept.log_s * logs:.3g} s of the fit over the archive in one process ({kept.log_s * 1e3:.2g} ms a log). The "
         f"scheduler could keep {log_s / task_s:.2g} workers busy."
     )
-    terabytes = moved.read * rows / (ROUND_S * RATE_HZ) * logs / 1e12
+    terabytes = moved.read * rows / log.least * logs / 1e12
     yield (
         f"It would send {moved.scheduled * logs / 1e6:.3g} MB through the scheduler, and read {terabytes:.2g} TB of logs. The "
         f"archive keeps {kept.log_kept / 1e3:.0f} kB of sums and its fit holds {kept.log_memory / 1e6:.2g} MB for each log of "
