@@ -113,7 +113,7 @@ def says(values: Values, instance: str | None) -> str:
     )
     listing = ", ".join(f"{name} is {value:.2f} times the model's" for name, value in changed.items())
     return (
-        f"The hull model's {what or 'coefficients'} are wrong: {listing}."
+        f"The hull model's {what or 'coefficients'} {'is' if what == 'damping' else 'are'} wrong: {listing}."
         if listing
         else "The hull model is somewhat wrong."
     )
