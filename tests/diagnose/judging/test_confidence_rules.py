@@ -30,11 +30,8 @@ from ferryid.diagnose.judging.confidence_rules import (
     out_of_step_beside_disturbance,
     passes_by_little,
     place_visited_once,
-<<<<<<< HEAD
     pose_jumps,
-=======
     predictive,
->>>>>>> 34c4f4f8 (Diagnosis: hints whose name alone is in doubt enter the model where held-out predictions are better with them; second logs compared by the acceleration's error on one mass)
     removes_little,
     too_brief,
     unexplained_shares,
