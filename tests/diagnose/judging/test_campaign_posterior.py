@@ -16,12 +16,9 @@ from ferryid.diagnose.inference.campaign import CommonHull
 from ferryid.diagnose.inference.campaign_estimation import estimate_campaign
 from ferryid.diagnose.inference.campaign_properties import with_property
 from ferryid.diagnose.inference.estimation import Candidate
-from ferryid.diagnose.inference.stages import AveragedLog
 from ferryid.diagnose.judging.campaign import JudgedCampaign
 from ferryid.diagnose.judging.campaign_conditions import JudgedConditions
 from ferryid.diagnose.judging.campaign_posterior import campaign_posterior
-from ferryid.diagnose.judging.conclude import _with_origin
-from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.diagnose.judging.posterior import Posterior
 from ferryid.effects import effects
 from ferryid.models import Quantity, Source, StoredEffect
@@ -92,22 +89,6 @@ def test_a_guessed_hull_is_not_kept() -> None:
     made = campaign_posterior(together, "log0", None, [wind()], survey())
     assert made is not None
     assert made.hull is None
-
-
-def test_a_copy_of_a_log_teaches_nothing() -> None:
-    own = Posterior({}, {}, (), (StoredEffect("payload", None, {}, ()),))
-    diagnosis = Diagnosis("log1", "milliampere", "explained", (wind(),), {}, {}, posterior=own)
-    screened = SimpleNamespace(
-        measured=SimpleNamespace(survey=survey()),
-        measurements=SimpleNamespace(profile=SimpleNamespace(given_as="boats/vessel.toml")),
-    )
-    log = cast(AveragedLog, SimpleNamespace(path="log1", screened=screened))
-    alone, copy = (_with_origin(diagnosis, log, campaign(), other) for other in (None, "log0"))
-    assert alone.posterior is not None
-    assert not alone.copy
-    assert alone.profile == "boats/vessel.toml"
-    assert copy.posterior is None
-    assert copy.copy
 
 
 def test_a_load_of_all_logs_is_a_condition_of_each_and_no_property_of_the_vessel() -> None:
