@@ -1,4 +1,4 @@
-"""Campaigns: time of many logs and of many bags diagnosed together, and the memory of a season, as whole processes."""
+"""Campaigns: time of many logs and of many bags diagnosed together, and how memory grows, as whole processes."""
 
 from __future__ import annotations
 
@@ -15,24 +15,28 @@ LOGS, LOG_S, LOGS_GOAL_S = 18, 720, 60.0
 """Logs of a campaign, the length of each [s], and the goal of all [s]."""
 BAGS, BAG_S, BAGS_GOAL_S = 60, 20, 30.0
 """Bags of a campaign, the length of each [s], and the goal of all [s]."""
-SEASON = 100
-"""Logs of `LOG_S`, of which the memory counts."""
+SEASON, MORE = 100, 36
+"""Logs of `LOG_S` whose memory has a goal, and how many are measured: it grows with each log by the same."""
 
 
 def run(quick: bool) -> Section:
     """Measure campaigns on logs that were read by nobody before; `quick` a few short ones."""
-    logs, log_s, bags, season = (2, 120, 4, 2) if quick else (LOGS, LOG_S, BAGS, SEASON)
+    logs, log_s, bags, more = (2, 120, 4, 3) if quick else (LOGS, LOG_S, BAGS, MORE)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        long = [written(folder, 1 + k, log_s) for k in range(season)]
+        long = [written(folder, 1 + k, log_s) for k in range(more)]
         short = [written(folder, 200 + k, BAG_S) for k in range(bags)]
         some = _diagnosed(long[:logs], folder / "logs")
-        every = some if season == logs else _diagnosed(long, folder / "season")
+        every = _diagnosed(long, folder / "more")
         of = f"{log_s / 60:.2g} min"
         rows: list[Row | Timed] = [
             _timed(f"campaign of {logs} logs of {of}", some, LOGS_GOAL_S),
             _timed(f"campaign of {bags} bags of {BAG_S} s", _diagnosed(short, folder / "bags"), BAGS_GOAL_S),
-            _memory(f"campaign of {season} logs of {of}, memory", every),
+            _memory(
+                f"campaign of {SEASON} logs of {of}, memory by {logs} and {more} logs",
+                grown(some[1], every[1], logs, more),
+                f", {every[1] / 1e9:.2f} GB and {duration(every[0])} of {more}",
+            ),
         ]
     notes = [
         f"`diagnose LOG...` of all together, whole processes, from the recorded logs to the report; {LARGEST_GB:g} GB of "
@@ -51,13 +55,17 @@ def _timed(what: str, measured: tuple[float, int], goal_s: float) -> Timed:
     return Timed(what, took, goal_s, f", {much / 1e9:.2f} GB", otherwise=much / 1e9 <= LARGEST_GB)
 
 
-def _memory(what: str, measured: tuple[float, int]) -> Row:
-    """Return the row of a campaign whose memory has a goal and whose time has none."""
-    took, much = measured
+def grown(few_bytes: float, many_bytes: float, few: int, many: int) -> float:
+    """Return the peak memory of a season [bytes], by those of campaigns of few and of many logs."""
+    return many_bytes + (SEASON - many) * max(many_bytes - few_bytes, 0.0) / (many - few)
+
+
+def _memory(what: str, much: float, more: str) -> Row:
+    """Return the row of a campaign whose memory has a goal."""
     share = much / 1e9 / LARGEST_GB
     return Row(
         what,
-        f"{much / 1e9:.2f} GB, {duration(took)}",
+        f"{much / 1e9:.2f} GB{more}",
         "memory allowed",
         f"{LARGEST_GB:g} GB",
         share,

@@ -75,8 +75,10 @@ def test_the_page_says_how_other_work_compares_with_the_yardstick() -> None:
 
 
 def test_memory_of_a_campaign_has_a_goal_of_its_own() -> None:
-    kept, more = (campaigns._memory("season", (300.0, much)) for much in (1_500_000_000, 2_500_000_000))
-    assert (kept.ours, kept.ratio, kept.reached) == ("1.50 GB, 300 s", 0.75, True)
+    kept, more = (campaigns._memory("season", much, " in all") for much in (1_500_000_000, 2_500_000_000))
+    assert (kept.ours, kept.ratio, kept.reached) == ("1.50 GB in all", 0.75, True)
+    # A hundred logs, by 0.1 GB for ten.
+    assert campaigns.grown(0.4e9, 0.5e9, 20, 30) == pytest.approx(1.2e9)
     assert more.reached is False
     timed = campaigns._timed("18 logs", (20.0, 2_500_000_000), 60.0)
     assert timed.row(yardstick.GOALS_S).reached is False
