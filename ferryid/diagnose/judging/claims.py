@@ -43,6 +43,8 @@ class Figures:
         Share of the held-out squared force error that it removes while it acts, by axis; empty where nothing was held out.
     lasts_s, block_s
         For how many seconds of data it acts, infinite for what acts throughout, and the length of a held-out block [s].
+    cycles
+        Of a disturbance in a narrow band that acts in a span, how many of its periods that holds.
     single_visit
         True where the vessel was only once in the place in which it acts.
     passes
@@ -69,6 +71,7 @@ class Figures:
     removed: Mapping[str, float] = field(default_factory=dict)
     lasts_s: float = inf
     block_s: float = 0.0
+    cycles: float = inf
     single_visit: bool = False
     passes: float = inf
     power_in_velocities: float = inf

@@ -277,6 +277,40 @@ def about_nothing_sure(finding: Finding, context: Context, _threshold: float) ->
     return _because(finding, f"the {effects()[about].title.lower()} about which it comes and goes is no sure finding")
 
 
+@rule(JUDGING.least_cycles, "periods")
+def few_cycles(finding: Finding, context: Context, threshold: float) -> Outcome:
+    """Lower a disturbance in a narrow band that lasts for fewer of its periods: that is an event, and no oscillation."""
+    if context.own.cycles >= threshold:
+        return finding, ""
+    return _because(
+        finding, f"it lasts for {context.own.cycles:.1f} of its periods, which may be one event of any kind"
+    )
+
+
+@rule()
+def with_another_force(finding: Finding, context: Context, _threshold: float) -> Outcome:
+    """Lower a disturbance that begins and ends with a force that is sure: it is what that force's formula leaves."""
+    if context.own.kind != "disturbance" or len(finding.ends) < 2:
+        return finding, ""
+    for one in context.beside:
+        other = one.finding
+        if (
+            one.figures.kind == "force"
+            and other.sure
+            and all(_meet(finding, other, end) for end in ("onset", "offset"))
+        ):
+            return _because(finding, f"it begins and ends with the {title_of(other).lower()}, whose formula may be off")
+    return finding, ""
+
+
+def _meet(one: Finding, other: Finding, end: str) -> bool:
+    """Return whether the intervals of when two findings begin, or end, overlap; False where one of them does not."""
+    if end not in one.parameters or end not in other.parameters:
+        return False
+    mine, its = one.parameters[end], other.parameters[end]
+    return mine.low <= its.high and its.low <= mine.high
+
+
 @rule(JUDGING.drowned_share, "of what moves the vessel")
 def noise_drowns_an_axis(finding: Finding, context: Context, threshold: float) -> Outcome:
     """Lower all findings on forces where the velocity's noise, times damping, is more than this on some axis."""
@@ -382,6 +416,8 @@ RULES: tuple[ConfidenceRule, ...] = (
     less_than_is_unexplained,
     hull_from_this_log,
     about_nothing_sure,
+    few_cycles,
+    with_another_force,
     noise_drowns_an_axis,
     pose_jumps,
     out_of_step_beside_disturbance,

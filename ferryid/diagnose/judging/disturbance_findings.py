@@ -133,9 +133,16 @@ def _claim(
             "disturbance",
             power_in_velocities=power_in_velocities,
             gain_in_velocities=state.gain_in_velocities,
+            cycles=_cycles(state, pushes),
             doubt=doubt,
         ),
     )
+
+
+def _cycles(state: DisturbanceState, pushes: Sequence[Process]) -> float:
+    """Return how many of its periods a disturbance lasts for; infinite for one that has none, or acts throughout."""
+    highest = max((one.frequency_hz for one in pushes), default=0.0)
+    return inf if highest == 0.0 else (state.course.offset_s - state.course.onset_s) * highest
 
 
 def _power_in_velocities(evidence: Mapping[str, Floats]) -> float:

@@ -359,6 +359,12 @@ class JudgingThresholds:
         "deviation from an even power above which bursts are reported",
         "convention: rare by chance even over all bands and blocks that are searched",
     )
+    least_cycles: float = threshold(
+        5.0,
+        "periods",
+        "of a disturbance in a narrow band, below which a span of it is an event and no oscillation",
+        "convention: a band shows by repetition; chosen after a draw of the proof in which 2.3 periods were named waves",
+    )
     reported_change: float = threshold(
         0.02, "of the squared force error", "least change that is reported", "convention: too little to act on"
     )

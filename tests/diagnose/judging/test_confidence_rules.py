@@ -18,6 +18,7 @@ from ferryid.diagnose.judging.confidence_rules import (
     absent_in_other_logs,
     absent_in_velocities,
     apply_rules,
+    few_cycles,
     hull_from_this_log,
     improves_no_claimed_axis,
     in_baseline,
@@ -35,6 +36,7 @@ from ferryid.diagnose.judging.confidence_rules import (
     removes_little,
     too_brief,
     unexplained_shares,
+    with_another_force,
     worse_on_an_axis,
 )
 from ferryid.diagnose.judging.finding import UNKNOWN, Finding, LawTerm
@@ -59,7 +61,7 @@ def on(kind: Kind, **figures: object) -> Context:
 
 def test_every_rule_has_a_name_a_line_and_its_unit() -> None:
     names = [one.name for one in RULES]
-    assert len(names) == len(set(names)) == 20
+    assert len(names) == len(set(names)) == 22
     for one in RULES:
         assert one.about.endswith((".", ":", ",")) or one.about, one.name
         assert (one.threshold is None) == (one.unit == ""), one.name
@@ -365,3 +367,35 @@ def test_a_hint_for_its_name_alone_predicts() -> None:
 def test_a_hint_of_an_axis_that_gets_worse_does_not_predict() -> None:
     worse = Claim(replace(found("time_delay"), improvement={"yaw": -0.5}), Figures("force", score=50.0))
     assert not predictive([worse], LogFigures(unsteady=True))
+
+
+def test_what_lasts_for_a_few_of_its_periods_is_an_event() -> None:
+    assert stands(few_cycles, found("waves"), on("disturbance", cycles=JUDGING.least_cycles))
+    assert stands(few_cycles, found("gusts"), on("disturbance"))
+    lowered, note = few_cycles(found("waves"), on("disturbance", cycles=2.34))
+    assert lowered is not None
+    assert not lowered.sure
+    assert note == "Waves is a hint: it lasts for 2.3 of its periods, which may be one event of any kind."
+
+
+def between(effect: str, onset: tuple[float, float], offset: tuple[float, float]) -> Finding:
+    ends = {
+        name: Estimate(0.5 * (low + high), low, high, "s")
+        for name, (low, high) in (("onset", onset), ("offset", offset))
+    }
+    return replace(found(effect), parameters=ends, onset_s=ends["onset"].value, offset_s=ends["offset"].value)
+
+
+def test_a_disturbance_that_begins_and_ends_with_a_force_is_what_that_leaves() -> None:
+    push = between("external_push", (353.3, 354.1), (531.1, 531.8))
+
+    def judged(waves: Finding, other: Finding) -> bool:
+        context = Context(Figures("disturbance"), beside=(Claim(other, Figures("force")),))
+        return stands(with_another_force, waves, context)
+
+    same = between("waves", (330.0, 355.0), (528.0, 552.0))
+    assert not judged(same, push)
+    assert judged(same, replace(push, probability=0.4))
+    assert judged(between("waves", (330.0, 355.0), (540.0, 552.0)), push)
+    assert judged(found("waves"), push)
+    assert stands(with_another_force, push, Context(Figures("force"), beside=(Claim(push, Figures("force")),)))
