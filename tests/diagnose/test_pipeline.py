@@ -56,7 +56,8 @@ def test_every_log_is_read_aligned_and_checked_once(
     logs = [str(shutil.copy(SHORT, tmp_path / f"{name}.mcap")) for name in "ab"]
     settings = DiagnosisSettings(each=each)
     made = diagnose(logs, load_profile("milliampere"), settings, IN_MEMORY)
-    assert [one.log for one in made] == ["a", "b"]
+    # As a campaign, the second is a copy and left out once it is read.
+    assert [one.log for one in made] == (["a", "b"] if each else ["a"])
     assert counts == {"record": 2, "align": 2, "examine": 2}
 
 

@@ -35,7 +35,7 @@ MIRRORED, EXCHANGED = "the heading mirrored", "another log's heading"
 class HeldOutLoss:
     """Whitened squares of held-out blocks, shape (blocks,), the log of each, and the errors of every log's windows.
 
-    The squares of a block that the rest cannot predict are NaN. The errors are accelerations along the vessel's axes, shape
+    What the rest cannot predict of a block shows no error; the squares of one of which it predicts nothing are NaN. The errors are accelerations along the vessel's axes, shape
     (J, 3) for each log.
     """
 
@@ -86,12 +86,14 @@ def _log_loss(made: CampaignFit, i: int) -> tuple[Floats, Floats]:
     squares = []
     for block, near in held_out_blocks(windows):
         J, w = part.slopes[near].reshape(-1, C.shape[0]), part.gaps[near].ravel()
-        unknown = np.eye(len(w)) - J @ C @ J.T
-        if float(np.linalg.eigvalsh(unknown)[0]) < JUDGING.least_predicted:
-            # Some combination of the parameters is known from this block alone: without it, the prior would be judged.
+        shares, along = np.linalg.eigh(np.eye(len(w)) - J @ C @ J.T)
+        # A combination of the errors that this block alone determines is not predicted: the prior would be judged by it.
+        predicted = shares >= JUDGING.least_predicted
+        if not predicted.any():
             squares.append(np.nan)
             continue
-        shift = C @ (J.T @ np.linalg.solve(unknown, w))
+        along = along[:, predicted]
+        shift = C @ (J.T @ (along @ ((along.T @ w) / shares[predicted])))
         left = part.gaps[block] + part.slopes[block] @ shift
         squares.append(float(np.sum(left**2)))
         errors[block] += slopes[block] @ shift
