@@ -35,8 +35,8 @@ MIRRORED, EXCHANGED = "the heading mirrored", "another log's heading"
 class HeldOutLoss:
     """Whitened squares of held-out blocks, shape (blocks,), the log of each, and the errors of every log's windows.
 
-    What the rest cannot predict of a block shows no error; the squares of one of which it predicts nothing are NaN. The errors are accelerations along the vessel's axes, shape
-    (J, 3) for each log.
+    What the rest cannot predict of a block shows no error; the squares of one of which it predicts nothing are NaN. The errors
+    are accelerations along the vessel's axes, shape (J, 3) for each log.
     """
 
     blocks: Floats
