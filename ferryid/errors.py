@@ -32,6 +32,10 @@ class UnwritableError(FerryIdError):
     """A place that cannot be written, or a full disk: no fault of the input, which may be usable another time."""
 
 
+class ReversedForcesError(FerryIdError):
+    """A log in which the vessel accelerates against the applied force: the profile says the opposite of what acts."""
+
+
 def one_line(message: str) -> str:
     """Return a message fit for a terminal and a single line: control characters written out, an endless one shortened."""
     if len(message) > _LONGEST:

@@ -88,7 +88,7 @@ def evaluate(
                 "rows": int(rows.sum()),
                 "seconds": float(rows.sum() / motion.rate_hz),
                 **_scores(force_scores(motion.tau, tau_base, tau_model, rows), profile).to_json(),
-                "prediction": _prediction_json(windows[-1:], profile),
+                "prediction": _prediction_json(windows[-1:], model, profile),
                 "free_run": {
                     "base": old_run.to_json(),
                     "model": new_run.to_json(),
@@ -117,7 +117,7 @@ def evaluate(
         "logs": entries,
         "pooled": {
             **_scores(force_scores(tau, base_all, model_all, np.ones(len(tau), dtype=bool)), profile).to_json(),
-            "prediction": _prediction_json(windows, profile),
+            "prediction": _prediction_json(windows, model, profile),
         },
     }
 
@@ -137,13 +137,15 @@ def _in_windows(
     return force, base_error, error
 
 
-def _prediction_json(windows: Sequence[tuple[Floats, Floats, Floats]], profile: Profile) -> dict[str, Any]:
+def _prediction_json(
+    windows: Sequence[tuple[Floats, Floats, Floats]], model: Model, profile: Profile
+) -> dict[str, Any]:
     """Return the prediction errors of what `_in_windows` returned for every log."""
-    force, base, model = (np.concatenate(columns) for columns in zip(*windows, strict=True))
+    force, base, errors = (np.concatenate(columns) for columns in zip(*windows, strict=True))
     return {
-        "window_s": window_seconds(profile),
+        "window_s": window_seconds(parse_profile(model.profile_text, model.name)),
         "windows": len(force),
-        **_scores(window_scores(force, base, model), profile).to_json(),
+        **_scores(window_scores(force, base, errors), profile).to_json(),
     }
 
 

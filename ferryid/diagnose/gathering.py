@@ -84,6 +84,7 @@ def gather(
                 raise
             return error
 
+    given, paths = list(paths), list({_resolved(path): path for path in reversed(paths)}.values())[::-1]
     made = over(screened, paths)
     found = [one for one in made if isinstance(one, AveragedLog)]
     errors = {path: one for path, one in zip(paths, made, strict=True) if isinstance(one, FerryIdError)}
@@ -94,12 +95,22 @@ def gather(
         f"Left out of the {whose}: {error if Path(path).stem in str(error) else f'{path}: {error}'}"
         for path, error in errors.items()
     ]
+    notes += [
+        f"Given twice: {path}: it counts once"
+        for path in dict.fromkeys(given)
+        if sum(_resolved(path) == _resolved(one) for one in given) > 1 and path in paths
+    ]
     kept, why = sort_out(found, whose)
     copies = tuple(repeated(kept))
     again = {path for path, _ in copies}
     kept = [one for one in kept if one.path not in again]
     why += [_copied(path, other, whose) for path, other in copies]
     return Gathered(tuple(kept), (*notes, *why, *_clocks(kept)), copies)
+
+
+def _resolved(path: str) -> tuple[str, ...]:
+    """Return what a path leads to, part by part."""
+    return tuple(str(Path(part).resolve()) for part in path.split("+"))
 
 
 def _copied(path: str, other: str, whose: str) -> str:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ferryid.errors import FerryIdError
+from ferryid.errors import ReversedForcesError
 from ferryid.identify.contradictions import signs_of, wrong_way
 from ferryid.identify.inertia import relative_inertia, without_inertia
 from ferryid.identify.motion_data import LogData
@@ -133,7 +133,7 @@ def refuse_reversed_forces(data: LogData) -> str:
 
     Raises
     ------
-    FerryIdError
+    ReversedForcesError
         With what explains it and the line of the profile to change.
     """
     if data.settings.residual != "measured":
@@ -144,7 +144,7 @@ def refuse_reversed_forces(data: LogData) -> str:
     profile = data.profile
     told = wrong_way(found.reversed, found.spread, f"the profile {profile.name}", *signs_of(profile))
     if told:
-        raise FerryIdError(f"{data.where}: {told}")
+        raise ReversedForcesError(f"{data.where}: {told}")
     return _undecided(found, profile)
 
 

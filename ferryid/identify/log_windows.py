@@ -50,7 +50,7 @@ class WindowPart:
     rows
         Number of marked rows.
     blocks
-        Number of blocks as long as a window that their unbroken stretches hold.
+        Number of blocks as long as the usual window that their unbroken stretches hold.
     """
 
     measured: WeakRows
@@ -232,7 +232,7 @@ def average_log(
             ),
             sectors=heading_sectors(motion.eta[rows, 2]),
             rows=int(np.count_nonzero(rows)),
-            blocks=sum(int(one / length_s + 1e-9) for one in lengths),
+            blocks=sum(int(one / window_seconds(profile) + 1e-9) for one in lengths),
         )
 
     return LogWindows(

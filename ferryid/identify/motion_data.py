@@ -64,8 +64,8 @@ class MotionData(FitData):
 
     @property
     def held_out_blocks(self) -> int:
-        """Number of blocks as long as a prediction window that the unbroken stretches of the validation rows hold."""
-        length_s = self.settings.weak_window_s or window_seconds(self.profile)
+        """Number of blocks as long as the usual window, whichever trained, that unbroken stretches of validation rows hold."""
+        length_s = window_seconds(self.profile)
         return sum(
             int((stretch.stop - stretch.start) / motion.rate_hz / length_s + 1e-9)
             for motion, mask in zip(self.motions, self.split.validation, strict=True)

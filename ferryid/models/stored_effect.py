@@ -230,7 +230,7 @@ def _source(data: Mapping[str, Any]) -> Source:
     return Source(
         _text(data["log"]),
         _text(data["sha256"]),
-        _finite(data["probability"], "probability"),
+        _share(data["probability"], "probability"),
         onset_s,
         {str(axis): _finite(share, f"improvement.{axis}") for axis, share in data["improvement"].items()},
         tuple(_text(one) for one in _listed(data["unresolved_with"])),
@@ -256,6 +256,13 @@ def _finite(value: Any, what: str) -> float:
     number = _number(value, what)
     if not math.isfinite(number):
         raise ValueError(f"{what} is not finite")
+    return number
+
+
+def _share(value: Any, what: str) -> float:
+    number = _finite(value, what)
+    if not 0.0 <= number <= 1.0:
+        raise ValueError(f"{what} is {number:g}, not within 0 and 1")
     return number
 
 

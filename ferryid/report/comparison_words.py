@@ -145,7 +145,15 @@ def headline(result: ComparisonResult) -> str:
             row for row in result.statements
             if (row.on, row.kind, row.second) == (on, "force", BASE) and row.better and row.evidence
         ]  # fmt: skip
-        kept = "" if shown else "No fitted model is shown to be better than the profile's hull: keep the hull. "
+        free = {
+            row.first for row in result.statements
+            if (row.on, row.second) == (on, BASE) and row.kind != "force" and row.better and row.evidence
+        }  # fmt: skip
+        if not shown and free:
+            kept = "No fitted model is shown to have less force error than the profile's hull, but run free "
+            kept += f"{listed(sorted(free))} {'is' if len(free) == 1 else 'are'} better. "
+        elif not shown:
+            kept = "No fitted model is shown to be better than the profile's hull: keep the hull. "
     return f"{kept}Least force error, {title}: {'; '.join(told)}."
 
 

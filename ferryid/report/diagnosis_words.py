@@ -355,7 +355,7 @@ def about_errors(diagnosis: Diagnosis) -> list[str]:
     if "window_s" in diagnosis.before:
         lines.append(
             f"These errors are means over windows of {diagnosis.before['window_s']:.2g} s, in which what is faster cancels. "
-            "Those of ferryid evaluate are of single rows of smoothed data, and larger as a rule."
+            "Those of ferryid evaluate are of all rows of a log, and row by row larger as a rule."
         )
     return lines
 

@@ -35,8 +35,9 @@ def render_evaluation(result: dict[str, Any]) -> str:
         lines.extend(f"  acts, as in this log: {one['says']}" for one in applied["conditions"])
         lines.extend(f"  {told}" for told in applied["left_out"])
         lines.extend(f"  warning: {warning}" for warning in entry.get("warnings", ()))
-    if any("prediction" in entry for entry in entries):
-        lines += ["", *_explained(result["pooled"]["prediction"]["window_s"])]
+    pooled = result.get("pooled", {}).get("prediction", {})
+    if pooled.get("windows"):
+        lines += ["", *_explained(pooled["window_s"], "base" in head)]
     return "\n".join(lines)
 
 
@@ -58,24 +59,29 @@ def _prediction_lines(scores: dict[str, Any]) -> list[str]:
     return _score_lines(scores, _WINDOWS)
 
 
-def _explained(window_s: float) -> list[str]:
-    """Return what the two kinds of errors are, as lines."""
-    return [
+def _explained(window_s: float, diagnosed: bool) -> list[str]:
+    """Return what the two kinds of errors are, as lines; the base of a diagnosed model sees all that was measured."""
+    lines = [
         "MSE, rms error: the applied force estimated row by row from the motion, against the measured one. The noise of the",
-        "  differentiated velocity is in it, and is the most of it in many logs.",
+        "  differentiated velocity is in it, and is the most of it in many logs. It is in the model's own thrust: one that",
+        "  takes thrusters and hull for half as much moves alike, with half that error.",
         "prediction error: the acceleration predicted from force and velocity, against the measured one, averaged over",
-        f"  windows of {window_s:.3g} s, as force on the base model's mass, as fit judges. Little of the noise is in it. The",
-        "  base model is without measured wind, current and payload there.",
+        f"  windows of {window_s:.3g} s, as force on the base model's mass, as fit judges. Little of the noise is in it.",
     ]
+    return lines if diagnosed else [*lines, "  The base model is without measured wind, current and payload there."]
 
 
 def _verdict(entry: dict[str, Any], error: str) -> str:
     mean = entry["normalised_mse"]
     worse = [axis for axis in AXES if np.isfinite(entry["per_axis"][axis]) and entry["per_axis"][axis] > 1.05]
+    if np.isinf(mean):
+        return f"cannot be judged: the model has no mass matrix that can be inverted ({error})"
     if not np.isfinite(mean):
         return "cannot be judged: the base model makes no error here"
     better = mean < 1.0
-    told = f"{abs(mean - 1.0):.0%} {'better' if better else 'worse'} than its base model here ({error})"
+    # Hardly any error is left, but some.
+    digits = 1 if 0.0 < mean < 0.005 else 0
+    told = f"{abs(mean - 1.0):.{digits}%} {'better' if better else 'worse'} than its base model here ({error})"
     if not worse:
         return told
     if len(worse) == len(AXES):

@@ -11,6 +11,7 @@ import numpy as np
 
 from ferryid.errors import FerryIdError
 from ferryid.signals.align import align
+from ferryid.signals.copies import same_recording
 from ferryid.signals.data_quality import left_out_sentences
 from ferryid.signals.faults import Faults
 from ferryid.signals.quality import POSE
@@ -172,12 +173,18 @@ def smoothed(opened: Opened, window_s: float, smoother: str = "square", *, keep_
 def refuse_twice(opened: Sequence[Opened]) -> None:
     """Refuse a log that is given twice: it would train and validate on the same data."""
     seen: dict[str, str] = {}
-    for one in opened:
+    for k, one in enumerate(opened):
         first = seen.get(one.recording.sha256)
         if first is not None:
             raise FerryIdError(
                 f"{one.recording.files[0]}: the same log as {first}, so that it would judge itself. Fix: give it once"
             )
+        for other in opened[:k]:
+            if same_recording(one.recording, other.recording):
+                raise FerryIdError(
+                    f"{one.recording.files[0]}: holds the recording of {other.recording.files[0]}, or a piece of it, so that "
+                    "it would judge itself. Fix: give one of the two"
+                )
         seen[one.recording.sha256] = one.recording.files[0]
     files = [file for one in opened for file in {str(Path(file).resolve()) for file in one.recording.files}]
     if shared := sorted({file for file in files if files.count(file) > 1}):

@@ -434,6 +434,12 @@ class SignalThresholds:
         "unexplained variance as declared over that when mirrored",
         "convention: no doubt which of two is right",
     )
+    shared_samples: float = threshold(
+        0.1,
+        "of the places of the shorter log",
+        "samples in sequence that another log has as well, above which both hold one recording",
+        "convention: a tenth; no two recordings have eight changing samples in sequence alike",
+    )
 
 
 SIGNALS = SignalThresholds()

@@ -207,3 +207,7 @@ def test_left_and_right_exchanged_on_a_real_catamaran_are_refused(ferryid, share
     run = ferryid("fit", *logs, "--vessel", vessel, "--components", "6", "--out", tmp_path / "out")
     refused(run, "the yaw moment accelerates the vessel", "actuators are exchanged (port and starboard")
     drawn(run, tmp_path / "out")
+    # What a diagnosis finds beside them would be names of the wrong physics.
+    run = ferryid("diagnose", *logs, "--vessel", vessel, "--out", tmp_path / "diagnosed")
+    refused(run, "the yaw moment accelerates the vessel", "actuators are exchanged (port and starboard")
+    assert not list((tmp_path / "diagnosed").glob("models/*"))

@@ -101,7 +101,7 @@ def fitted(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Run]:
 @pytest.fixture(scope="module")
 def compared(fitted: tuple[Path, Run]) -> Run:
     """Return what the comparison of the two printed."""
-    logs = ("--on", FIXTURES / "short.mcap", FIXTURES / "short.bag")
+    logs = ("--on", FIXTURES / "short.mcap", FIXTURES / "second.bag")
     return invoke("compare", "milliampere@1", "milliampere@2", *logs, "--out", fitted[0], "--json", "-")
 
 
@@ -109,7 +109,7 @@ def compared(fitted: tuple[Path, Run]) -> Run:
 def test_ingest_fit_evaluate_compare_and_models(
     ferryid, fixtures: Path, fitted: tuple[Path, Run], compared: Run
 ) -> None:
-    log, other, (out, run) = fixtures / "short.mcap", fixtures / "short.bag", fitted
+    log, other, (out, run) = fixtures / "short.mcap", fixtures / "second.bag", fitted
 
     fit = conforms(run.out)
     assert run.code == 0
@@ -157,7 +157,7 @@ def test_ingest_fit_evaluate_compare_and_models(
 def test_the_logs_of_a_comparison_are_given_in_several_ways(
     ferryid, fixtures: Path, fitted: tuple[Path, Run], compared: Run, tmp_path: Path
 ) -> None:
-    log, other, (out, _) = fixtures / "short.mcap", fixtures / "short.bag", fitted
+    log, other, (out, _) = fixtures / "short.mcap", fixtures / "second.bag", fitted
     models, comparison = ("compare", "milliampere@1", "milliampere@2"), conforms(compared.out)
     again = ferryid(*models, "--on", log, "--on", other, "--out", out, "--json", tmp_path / "again.json")
     assert conforms((tmp_path / "again.json").read_text(encoding="utf-8")) == comparison
@@ -174,7 +174,7 @@ def test_the_logs_of_a_comparison_are_given_in_several_ways(
 @pytest.mark.draws
 @pytest.mark.parametrize(("what", "windows"), [("components", 1), ("window", 8), ("both", 2)])
 def test_sweep_settings(ferryid, fixtures: Path, tmp_path: Path, what: str, windows: int) -> None:
-    logs = [fixtures / "short.mcap", fixtures / "short.bag"]
+    logs = [fixtures / "short.mcap", fixtures / "second.bag"]
     options = ("--windows", "0.5,1") if what == "both" else ()
     run = ferryid("sweep", what, *logs, "--vessel", "milliampere", *SCALE, *options, "--out", tmp_path, "--json", "-")
     assert run.code == 0, run.err
@@ -197,7 +197,7 @@ def test_sweep_settings(ferryid, fixtures: Path, tmp_path: Path, what: str, wind
 
 @pytest.mark.draws
 def test_sweep_structures(ferryid, fixtures: Path, tmp_path: Path) -> None:
-    logs = [fixtures / "short.mcap", fixtures / "short.bag"]
+    logs = [fixtures / "short.mcap", fixtures / "second.bag"]
     run = ferryid("sweep", "basis", *logs, "--vessel", "milliampere", *SCALE, "--out", tmp_path, "--json", "-")
     assert run.code == 0, run.err
     found = conforms(run.out)

@@ -44,6 +44,8 @@ HEAD = {"model": {"name": "ferry", "version": 1}, "window_s": 2.0}
         # An axis on which the base model is right cannot be judged.
         ((np.nan, 1.2, 1.4), "30% worse than its base model here (mean square force error), namely in sway and yaw"),
         ((np.nan, np.nan, np.nan), "cannot be judged: the base model makes no error here"),
+        # Hardly any error is left, but some.
+        ((0.002, 0.003, 0.001), "99.8% better than its base model here (mean square force error)"),
     ],
 )
 def test_the_verdict_says_where_a_model_is_worse(ratios: tuple[float, float, float], told: str) -> None:

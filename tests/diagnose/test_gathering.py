@@ -191,3 +191,18 @@ def test_logs_are_measured_side_by_side_and_stay_in_their_order(
     monkeypatch.setattr(side_by_side, "usable_cores", lambda: 2)
     monkeypatch.setattr(gathering, "measure_log", met)
     assert [one.path for one in gather(days[:2], FERRY, IN_MEMORY).logs] == days[:2]
+
+
+def test_a_path_given_twice_counts_once(tmp_path: Path) -> None:
+    fixtures = Path(__file__).resolve().parents[2] / "fixtures"
+    log = str(shutil.copy(fixtures / "short.mcap", tmp_path / "a.mcap"))
+    found = gather([log, f"{tmp_path}/../{tmp_path.name}/a.mcap"], FERRY, IN_MEMORY)
+    assert [one.path for one in found.logs] == [log]
+    assert any(note == f"Given twice: {log}: it counts once" for note in found.notes)
+
+
+def test_a_piece_of_a_log_is_left_out(tmp_path: Path) -> None:
+    fixtures = Path(__file__).resolve().parents[2] / "fixtures"
+    found = gather([str(fixtures / "short.mcap"), str(fixtures / "short_ros2")], FERRY, IN_MEMORY)
+    assert [Path(one.path).name for one in found.logs] == ["short.mcap"]
+    assert [Path(path).name for path, _ in found.copies] == ["short_ros2"]

@@ -145,6 +145,7 @@ NO_DECISION = {
         regression.nipals MOST_ITERATIONS
     """,
     "sizes: rows held at once, draws, folds, bins, and how much is shown": """
+        signals.copies SAMPLES ROWS TRIED
         identify.weak_rows _CHUNK_WINDOWS
         regression.test_function _CHUNK_WINDOWS
         identify.shared_rows MOST_ROWS

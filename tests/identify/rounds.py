@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from zlib import crc32
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.signals.stream import Recording
 from ferryid.signals.track import Motion
 from ferryid.vessel import load_profile
 from ferryid.vessel.hull import inverse_dynamics
@@ -40,3 +42,13 @@ def with_flow(made: Motion, seed: int) -> Motion:
     turn = np.random.default_rng(seed).uniform(0.0, 6.0) + 0.01 * made.t
     around = np.column_stack([np.cos(turn), np.sin(turn)])
     return replace(made, wind=6.0 * around, current=0.3 * around[:, ::-1])
+
+
+def recorded_as(recording: Recording, name: str) -> Recording:
+    """Return a recording under another name, with samples of its own: it is no copy of the one that it was made of."""
+    factor = 1.0 + 1e-3 * (1 + crc32(name.encode()) % 1000)
+    streams = {
+        topic: replace(stream, columns={column: factor * values for column, values in stream.columns.items()})
+        for topic, stream in recording.streams.items()
+    }
+    return replace(recording, name=name, sha256=name, files=(name,), streams=streams)

@@ -334,7 +334,7 @@ def test_current_and_payload_reach_basis_report_and_json(logs: dict[str, str], t
 
 
 def test_what_is_not_weighed_is_told(logs: dict[str, str], tmp_path: Path) -> None:
-    result = fit_logs([logs["boarded"], logs["unweighed"]], PROFILE, SETTINGS, RunContext(tmp_path))
+    result = fit_logs([logs["drifted"], logs["unweighed"]], PROFILE, SETTINGS, RunContext(tmp_path))
     assert any("1 of 2 logs has no payload measured" in warning for warning in result.warnings)
     (entry,) = evaluate(result.model, [logs["unweighed"]], RunContext(tmp_path))["logs"]
     assert any("this log has none: it is taken as empty" in warning for warning in entry["warnings"])

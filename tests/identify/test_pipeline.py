@@ -122,11 +122,11 @@ def test_held_axes_lose_their_acceleration_terms_only() -> None:
 
 @pytest.mark.slow
 def test_several_logs_and_whole_logs_for_validation(tmp_path: Path) -> None:
-    logs = [str(FIXTURES / "short.mcap"), str(FIXTURES / "short.bag")]
+    logs = [str(FIXTURES / "short.mcap"), str(FIXTURES / "second.bag")]
     result = fit_logs(logs, PROFILE, replace(SETTINGS, split="logs"), RunContext(tmp_path))
     assert [log.training.any() for log in result.logs] == [True, False]
     assert [log.validation.any() for log in result.logs] == [False, True]
-    assert [log.motion.log for log in result.logs] == ["short (1)", "short (2)"]
+    assert [log.motion.log for log in result.logs] == ["short", "second"]
 
 
 @pytest.mark.slow

@@ -18,7 +18,7 @@ from ferryid.report.sweep_text import headline, render_sweep
 from ferryid.signals.prepare import Opened, open_track, refuse_twice
 from ferryid.signals.smooth import Measured
 from ferryid.types import RunContext
-from tests.identify.rounds import PROFILE
+from tests.identify.rounds import PROFILE, recorded_as
 from tests.identify.trials import measured
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
@@ -40,7 +40,7 @@ def run(monkeypatch: pytest.MonkeyPatch, opened: Opened) -> Run:
             log.log: replace(
                 opened,
                 measured=log,
-                recording=replace(opened.recording, name=log.log, sha256=log.log, files=(log.log,)),
+                recording=recorded_as(opened.recording, log.log),
             )
             for log in logs
         }
@@ -173,7 +173,7 @@ def test_a_log_given_twice_is_refused(run: Run, opened: Opened, monkeypatch: pyt
 
 def test_a_part_of_two_logs_is_refused() -> None:
     part, whole = (
-        SimpleNamespace(recording=SimpleNamespace(sha256=name, files=files))
+        SimpleNamespace(recording=SimpleNamespace(sha256=name, files=files, streams={}))
         for name, files in (("1", ("a.bag",)), ("2", ("b.bag", "./a.bag")))
     )
     with pytest.raises(FerryIdError, match=r"a\.bag: is part of two logs.*Fix: "):

@@ -31,7 +31,7 @@ from ferryid.signals.prepare import Opened, open_track
 from ferryid.signals.smooth import Measured, smooth_measured
 from ferryid.signals.track import Motion
 from ferryid.types import RunContext
-from tests.identify.rounds import PROFILE, RATE_HZ
+from tests.identify.rounds import PROFILE, RATE_HZ, recorded_as
 from tests.identify.trials import measured
 
 pytestmark = pytest.mark.slow
@@ -61,7 +61,7 @@ def run(monkeypatch: pytest.MonkeyPatch, opened: Opened) -> Run:
             log.log: replace(
                 opened,
                 measured=log,
-                recording=replace(opened.recording, name=log.log, sha256=log.log, files=(log.log,)),
+                recording=recorded_as(opened.recording, log.log),
             )
             for log in logs
         }

@@ -27,7 +27,7 @@ from ferryid.report.sweep_text import render_sweep
 from ferryid.signals.prepare import Opened, open_track
 from ferryid.signals.smooth import Measured, smooth_measured
 from ferryid.types import RunContext
-from tests.identify.rounds import PROFILE
+from tests.identify.rounds import PROFILE, recorded_as
 from tests.identify.trials import measured
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
@@ -50,7 +50,7 @@ def run(monkeypatch: pytest.MonkeyPatch, opened: Opened) -> Run:
             log.log: replace(
                 opened,
                 measured=log,
-                recording=replace(opened.recording, name=log.log, sha256=log.log, files=(log.log,)),
+                recording=recorded_as(opened.recording, log.log),
             )
             for log in logs
         }

@@ -129,6 +129,7 @@ def test_a_model_of_a_fit_has_no_key_more() -> None:
         (lambda data: data["vessel_effects"][1].update(found_in=[]), "found in no log"),
         (lambda data: data["vessel_effects"][1]["found_in"][0].update(onset_s="late"), "onset_s is no number"),
         (lambda data: data["vessel_effects"][1]["found_in"][0].update(offset_s=900.0), "thruster_gain is no property"),
+        (lambda data: data["vessel_effects"][1]["found_in"][0].update(probability=1.4), "1.4, not within 0 and 1"),
         (
             lambda data: data["conditions"][0].update(effects=data["vessel_effects"][1:]),
             "thruster_gain is no condition of a log",

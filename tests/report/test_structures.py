@@ -25,7 +25,7 @@ PROFILE = load_profile("milliampere")
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory: pytest.TempPathFactory) -> StructureSweep:
-    logs = [str(FIXTURES / f"short.{suffix}") for suffix in ("bag", "mcap")]
+    logs = [str(FIXTURES / name) for name in ("second.bag", "short.mcap")]
     settings = FitSettings(delta=0.4, sigma=0.4)
     return sweep_structures(logs, PROFILE, settings, RunContext(tmp_path_factory.mktemp("out")))
 

@@ -25,7 +25,7 @@ WINDOWS_S = {"components": (), "window": (0.5, 1.0, 2.0), "both": (0.5, 1.0, 2.0
 
 @pytest.fixture(scope="module", params=list(WINDOWS_S))
 def found(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Sweep:
-    logs = [str(FIXTURES / f"short.{suffix}") for suffix in ("bag", "mcap")]
+    logs = [str(FIXTURES / name) for name in ("second.bag", "short.mcap")]
     return sweep_settings(
         request.param, logs, load_profile("milliampere"), FitSettings(delta=0.4, sigma=0.4),
         RunContext(tmp_path_factory.mktemp("out")), windows_s=WINDOWS_S[request.param],

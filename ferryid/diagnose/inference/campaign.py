@@ -19,6 +19,7 @@ from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS, ForceModel
 from ferryid.models import Model
+from ferryid.signals.copies import same_recording
 from ferryid.types import Floats
 from ferryid.vessel.dimensions import dimensions
 from ferryid.vessel.profile import Profile
@@ -121,10 +122,15 @@ def repeated(logs: Sequence[AveragedLog]) -> list[tuple[str, str]]:
     found: list[tuple[str, str]] = []
     for k, log in enumerate(logs):
         for other in logs[:k]:
-            if log.path != other.path and _same(log.windows, other.windows):
+            if log.path != other.path and (_same(log.windows, other.windows) or _piece(log, other)):
                 found.append((log.path, other.path))
                 break
     return found
+
+
+def _piece(one: AveragedLog, other: AveragedLog) -> bool:
+    recordings = [log.screened.measured.survey.recording for log in (one, other)]
+    return same_recording(*recordings)
 
 
 def _same(one: Windows, other: Windows) -> bool:

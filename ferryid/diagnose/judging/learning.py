@@ -12,7 +12,7 @@ import numpy as np
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
 from ferryid.effects.wording import listed, titled
-from ferryid.errors import FerryIdError
+from ferryid.errors import FerryIdError, ReversedForcesError
 from ferryid.identify import (
     Acceptance,
     FitOutcome,
@@ -121,9 +121,17 @@ class Learner:
                 found = self._fitted(name)
             else:
                 found = self._on_top(diagnosed or replace(self._known_start(), name=name), diagnosed)
-            return found if wider is None else self._with_hints(wider, *found)
+        except ReversedForcesError:
+            # Whatever was found beside forces that act the wrong way is an error of the profile.
+            raise
         except FerryIdError as error:
             return diagnosed, Learned(False, f"Nothing was learned beside the findings: {error}")
+        if wider is None:
+            return found
+        try:
+            return self._with_hints(wider, *found)
+        except FerryIdError:
+            return found
 
     def _with_hints(self, wider: Model, model: Model | None, learned: Learned) -> tuple[Model | None, Learned]:
         """Return a model with effects that are hints where it predicts better than the one without them, else that one."""
@@ -131,11 +139,8 @@ class Learner:
         # A hull that was refitted to all rows has seen those that decide here.
         unseen = replace(wider, hull=start.hull)
         sure = _confirmed(unseen)
-        try:
-            found = self._remainder(unseen)
-            beside = self._remainder(sure).model if _effects(sure) else self._plain.model
-        except FerryIdError:
-            return model, learned
+        found = self._remainder(unseen)
+        beside = self._remainder(sure).model if _effects(sure) else self._plain.model
         rows = [a.validation & b.validation for a, b in zip(self._plain.logs, found.outcome.logs, strict=True)]
         compared = [start, beside, self._plain.model, unseen, found.model]
         base, without, fitted, bare, after = self._errors(compared, rows)
@@ -143,7 +148,8 @@ class Learner:
         if not (verdict.accepted and accept(without, after, "prediction").accepted):
             return model, learned
         if self.start is not None or self.profile.hull.has_model:
-            # About a hull that is known the refitted one, to all rows and with the noise's colour, is the better estimate.
+            # About a hull that is known the refitted one, to all rows and with the noise's colour, is the better estimate; what
+            # decides, and is told, are the errors of the one that has not seen these rows.
             stored, _ = self._on_top(wider, wider)
         else:
             stored = replace(found.model, accepted=True, scores=_scores(base, after, found.outcome))

@@ -84,7 +84,7 @@ def store_updated_model(
     if made is not None:
         with alone(out / "models"):
             path = str(save(made, out).path)
-    everywhere = learned is not None and (learned.accepted or learned.with_hints)
+    everywhere = learned is not None and learned.accepted
     return tuple(
         replace(
             one,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import isfinite
 from typing import Any
 
 from ferryid.counts import counted
@@ -204,14 +205,19 @@ def _as_a_fit(request: _Request) -> tuple[str, str, tuple[EstimatorScore, ...]]:
         return "derivative", f"{derivative}, as a fit cannot compare the two: {_cause(error)}.", ()
     if chosen.why:
         return "derivative", f"{derivative}, as a fit uses it: {chosen.why}.", ()
-    told = ", ".join(f"{one.name} {one.folds:.3g}" for one in chosen.scores)
+    told = ", ".join(_fold_error(one) for one in chosen.scores)
     name = "the weak form" if chosen.estimator == "weak" else "the derivative's"
-    return (
-        chosen.estimator,
-        f"Estimator auto: {name} was swept, which a fit uses; squared prediction error over the base model's on folds of "
-        f"the training rows: {told}.",
-        chosen.scores,
+    says = (
+        f"Estimator auto: {name} was swept, which a fit uses; squared prediction error over the base model's on folds of the "
+        f"training rows: {told}."
     )
+    return chosen.estimator, " ".join([says, *chosen.notes]), chosen.scores
+
+
+def _fold_error(score: EstimatorScore) -> str:
+    """Return how well an estimator predicts on folds, and where no hull has such coefficients."""
+    error = f"{score.folds:.3g}" if isfinite(score.folds) else "unknown"
+    return f"{score.name} {error}{'' if score.possible else ' (no hull has such inertia or damping)'}"
 
 
 def _cause(error: FerryIdError) -> str:

@@ -72,4 +72,4 @@ def _short(stored: StoredEffect) -> str:
     values = ", ".join(
         f"{name} {one.value:.3g}{'' if one.unit == '-' else ' ' + one.unit}" for name, one in stored.parameters.items()
     )
-    return f"{title}: {values}"
+    return f"{title}: {values}{'' if stored.confirmed else ' (a hint)'}"

@@ -1,0 +1,63 @@
+"""Logs that hold the same recording: copies, other formats, pieces; and logs that do not."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+import pytest
+
+from ferryid.signals.copies import same_recording
+from ferryid.signals.stream import Recording
+from ferryid.types import Floats
+
+
+def recording(**columns: Floats) -> Recording:
+    return cast(Recording, SimpleNamespace(streams={"/topic": SimpleNamespace(columns=columns)}))
+
+
+def track(seed: int, n: int = 2000) -> dict[str, Floats]:
+    steps = np.random.default_rng(seed).normal(size=(2, n))
+    return dict(zip(("x", "y"), np.cumsum(steps, axis=1), strict=True))
+
+
+def cut(columns: dict[str, Floats], part: slice) -> dict[str, Floats]:
+    return {name: values[part] for name, values in columns.items()}
+
+
+@pytest.mark.parametrize("part", [slice(None), slice(0, 1500), slice(300, None), slice(900, 1100)])
+def test_a_copy_and_a_piece_are_the_same_recording(part: slice) -> None:
+    whole = track(1)
+    piece = recording(**cut(whole, part))
+    assert same_recording(recording(**whole), piece)
+    assert same_recording(piece, recording(**whole))
+
+
+def test_another_format_rounds_the_values() -> None:
+    whole = track(1)
+    single = {name: values.astype(np.float32).astype(np.float64) for name, values in whole.items()}
+    assert same_recording(recording(**whole), recording(**single))
+
+
+def test_another_trial_is_not() -> None:
+    assert not same_recording(recording(**track(1)), recording(**track(2)))
+
+
+def test_pieces_that_overlap_by_half_are() -> None:
+    whole = track(1)
+    assert same_recording(recording(**cut(whole, slice(0, 1200))), recording(**cut(whole, slice(600, 2000))))
+
+
+def test_a_vessel_that_lies_still_and_a_coarse_sensor_show_nothing() -> None:
+    still = {"x": np.zeros(500), "y": np.zeros(500)}
+    assert not same_recording(recording(**still), recording(**still))
+    # Whole degrees that change now and then are alike in any two turns.
+    turn = {"psi": np.repeat(np.arange(100.0), 5)}
+    assert not same_recording(recording(**turn), recording(**turn))
+
+
+def test_without_a_position_velocities_count() -> None:
+    swell = {"u": track(3)["x"], "v": track(3)["y"]}
+    assert same_recording(recording(**swell), recording(**swell))
+    assert not same_recording(recording(**swell), recording(**track(3)))
