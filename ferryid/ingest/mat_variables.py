@@ -20,6 +20,8 @@ from ferryid.ingest.mat_tables import MOST_STRUCTS, Leaf, Node
 HDF5 = b"\x89HDF\r\n\x1a\n"
 _HEADER = 128
 _MATRIX, _COMPRESSED = 14, 15
+_CELL, _STRUCTURE, _TEXT, _NUMBERS, _COMPLEX = 1, 2, 4, range(6, 16), 0x800
+"""Classes of a variable, and the flag of complex numbers."""
 _LARGE_BYTES = 1 << 30
 _MOST_TIMES_LARGER = 100
 """A variable of more than `_LARGE_BYTES` that needs this many times the size of its file is not read."""
@@ -97,6 +99,15 @@ def _level_5(path: Path, content: bytes) -> MatVariables:
         if after > len(content):
             result.losses.append(_lost(path, "the MAT file ends within a variable"))
             break
+        if kind == _MATRIX and (held := _held_bytes(content[position:after], order)) < size:
+            # A damaged length would swallow the variables behind it.
+            result.losses.append(
+                _lost(
+                    path,
+                    f"the variable at byte {position} of the MAT file holds {held} bytes of the {size} that it states",
+                )
+            )
+            after = position + 8 + held
         try:
             _add(result, _loaded(_unpacked(content, position, after, order), order, content[:_HEADER]))
         except Exception as error:  # noqa: BLE001 - SciPy raises whatever a damaged file leads to
@@ -132,7 +143,12 @@ def _unpacked(content: bytes, position: int, after: int, order: str) -> bytes:
     """Return a variable as it is without compression."""
     (kind,) = struct.unpack_from(f"{order}I", content, position)
     if kind == _MATRIX:
-        return content[position:after]
+        # With the size that it has, whatever it states.
+        return (
+            content[position : position + 4]
+            + struct.pack(f"{order}I", after - position - 8)
+            + content[position + 8 : after]
+        )
     most = max(_LARGE_BYTES, _MOST_TIMES_LARGER * len(content))
     stream = zlib.decompressobj()
     plain = stream.decompress(content[position + 8 : after], most)
@@ -141,6 +157,41 @@ def _unpacked(content: bytes, position: int, after: int, order: str) -> bytes:
     if not stream.eof:
         raise ValueError("its end is missing")
     return plain
+
+
+def _held_bytes(variable: bytes, order: str) -> int:
+    """Return how many bytes the parts of a variable take up, by its class and size; those that it states where that is unknown.
+
+    After flags, dimensions and name come one part for numbers, two for complex ones, one for text, one for each cell, and of
+    structures the length and names of fields and one for each of them.
+    """
+    (stated,) = struct.unpack_from(f"{order}I", variable, 4)
+    parts, place = list[bytes](), 8
+    wanted = 3
+    while len(parts) < wanted:
+        if place + 8 > len(variable):
+            return int(stated)
+        kind, size = struct.unpack_from(f"{order}II", variable, place)
+        if kind >> 16:
+            parts.append(variable[place + 4 : place + 4 + (kind >> 16)])
+            place += 8
+        else:
+            parts.append(variable[place + 8 : place + 8 + size])
+            place += 8 + size + (-size % 8)
+        if len(parts) == 3:
+            flags = int.from_bytes(parts[0][:4], "big" if order == ">" else "little")
+            count = int(np.prod(np.frombuffer(parts[1], f"{order}i4"), dtype=float)) if len(parts[1]) % 4 == 0 else 0
+            own = {_CELL: count, _STRUCTURE: 2, _TEXT: 1}.get(flags & 0xFF, 1 + bool(flags & _COMPLEX))
+            if flags & 0xFF not in (_CELL, _STRUCTURE, _TEXT, *_NUMBERS) or not 0 <= own <= MOST_STRUCTS:
+                return int(stated)
+            wanted += own
+        elif len(parts) == 5 and flags & 0xFF == _STRUCTURE:
+            length = int.from_bytes(parts[3][:4], "big" if order == ">" else "little")
+            fields = len(parts[4]) // length if length else 0
+            if not 0 <= fields * count <= MOST_STRUCTS:
+                return int(stated)
+            wanted += fields * count
+    return min(place - 8, int(stated))
 
 
 def _loaded(variable: bytes, order: str, header: bytes) -> Mapping[str, Any]:

@@ -161,6 +161,21 @@ def test_one_damaged_variable_does_not_cost_the_others(tmp_path: Path) -> None:
     np.testing.assert_array_equal(reader.read({"table": ["u"]})["table"].columns["u"], R)
 
 
+@pytest.mark.parametrize("complex_too", [False, True])
+def test_a_length_that_swallows_the_next_variable_is_told_and_costs_nothing(tmp_path: Path, complex_too: bool) -> None:
+    extra = {"cells": np.array([[U, "text"]], dtype=object), "z": U * 1j} if complex_too else {}
+    path = saved(tmp_path, {"a": {"t": T, "u": U, **extra}, "b": {"t": T, "u": R}}, do_compression=False)
+    whole = open_log(path)
+    assert whole.losses == ()
+    content = bytearray(path.read_bytes())
+    content[132:136] = struct.pack("<I", len(content) - 136)
+    path.write_bytes(bytes(content))
+    reader = open_log(path)
+    (loss,) = reader.losses
+    assert "that it states" in loss.what
+    assert [topic.count for topic in reader.topics] == [topic.count for topic in whole.topics]
+
+
 @pytest.mark.parametrize(
     ("variables", "found"),
     [
