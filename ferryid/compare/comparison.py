@@ -19,6 +19,7 @@ from ferryid.compare.comparison_result import (
     LogErrors,
     ModelErrors,
     ModelPair,
+    PredictionErrors,
     Ratio,
 )
 from ferryid.compare.comparison_statements import PairedErrors, comparison_statements
@@ -29,8 +30,18 @@ from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError
 from ferryid.identify import check_window
 from ferryid.models import usable_rows
-from ferryid.models.forces import model_estimator
-from ferryid.models.prediction import HORIZONS_S, NO_MASS, Prediction, predict, runs_free, single_runs, starting_points
+from ferryid.models.forces import effective_mass, model_estimator
+from ferryid.models.prediction import (
+    HORIZONS_S,
+    NO_MASS,
+    Prediction,
+    WindowErrors,
+    predict,
+    runs_free,
+    single_runs,
+    starting_points,
+    window_errors,
+)
 from ferryid.regression.resampling import (
     PairedRatios,
     compare_pairs,
@@ -41,6 +52,8 @@ from ferryid.regression.resampling import (
 from ferryid.signals.prepare import Prepared, prepare
 from ferryid.signals.track import Motion
 from ferryid.types import AXES, Flags, Floats, RunContext, by_axis
+from ferryid.vessel.dimensions import window_seconds
+from ferryid.vessel.profile import Profile
 
 KEYS = ("position_m", "heading_rad", "speed_mps", "yaw_rate_radps")
 """Errors of free runs in JSON, in the order of `QUANTITIES`."""
@@ -64,6 +77,10 @@ class ComparedLog:
         Squared force errors summed over blocks, shape (blocks, m, 3); zero in sway where that was not measured.
     block_s
         Length of a block [s].
+    window_force
+        Force in J windows [N, N, N·m], shape (J, 3).
+    window_sums
+        Squared errors of the acceleration in these windows, as forces, summed over blocks, shape (blocks, m, 3).
     starts_s
         When each free run starts [s], shape (s,).
     errors
@@ -81,6 +98,8 @@ class ComparedLog:
     taus: Floats
     sums: Floats
     block_s: float
+    window_force: Floats
+    window_sums: Floats
     starts_s: Floats
     errors: Floats
     reached: Flags
@@ -138,6 +157,7 @@ def compare(
         schema="ferryid.compare/1",
         vessel=field.profile.name,
         window_s=window_s,
+        prediction_window_s=window_seconds(field.profile),
         models=tuple(_model(one) for one in field.candidates),
         warnings=(*field.warnings, *notes),
         logs=tuple(
@@ -206,6 +226,7 @@ def _compare_log(
     for k, prediction in enumerate(seen):
         if len(starts) and runs_free(prediction.force, prediction.motion):
             errors[k] = single_runs(prediction.force, prediction.motion, starts, ends, HORIZONS_S)
+    predicted = _predict_windows(seen, motion, rows, field.profile)
     warnings = [*prepared.doubts, *prepared.left_out]
     for one in field.candidates:
         warnings += [f"{one.label}: {caution}" for caution in range_warnings(one.model, motion, rows)]
@@ -224,11 +245,35 @@ def _compare_log(
         taus=taus,
         sums=sum_over_blocks(squares, at, block_s),
         block_s=block_s,
+        window_force=predicted.force,
+        window_sums=_window_sums(predicted, block_s, field.profile, sway=motion.sway_measured),
         starts_s=motion.t[starts],
         errors=errors,
         reached=reached,
         warnings=tuple(warnings),
     )
+
+
+def _predict_windows(seen: Sequence[Prediction], motion: Motion, rows: Flags, profile: Profile) -> WindowErrors:
+    """Return what each model predicts of the acceleration in windows, as a fit is judged; all errors on the profile's mass.
+
+    An error of the force in single rows is mostly noise of the differentiated velocity, and counts in each model's own thrust.
+    """
+    mass = effective_mass(profile, {}, (), np.zeros((0, 3)))
+    return window_errors(seen, motion, rows, mass, window_seconds(profile), reduced=not profile.measures_sway)
+
+
+def _window_sums(predicted: WindowErrors, block_s: float, profile: Profile, *, sway: bool) -> Floats:
+    """Return squared errors in windows summed over blocks, shape (blocks, m, 3).
+
+    Windows that overlap are no two, so that a block is twice as long as one. What a model cannot predict has no errors.
+    """
+    with np.errstate(over="ignore"):
+        squares = np.stack([error**2 for error in predicted.errors], axis=1)
+    squares[:, ~np.isfinite(squares).all(axis=(0, 2))] = np.nan
+    if not sway:
+        squares[:, :, 1] = 0.0
+    return sum_over_blocks(squares, predicted.starts_s, max(block_s, 2.0 * window_seconds(profile)))
 
 
 def _prediction(candidate: Candidate, prepared: Prepared, field: CandidateSet, window_s: float) -> Prediction:
@@ -312,6 +357,7 @@ def _pair_errors(field: CandidateSet, compared: Sequence[ComparedLog], runnable:
         on=compared[0].name if len(compared) == 1 else None,
         labels=field.labels,
         force=compare_pairs([log.sums for log in compared]),
+        prediction=compare_pairs([log.window_sums for log in compared]),
         runs=tuple(runs),
         horizons_s=HORIZONS_S,
         told_s=told,
@@ -337,9 +383,11 @@ def _errors(
     mse = np.sum([log.sums.sum(axis=0) for log in compared], axis=0) / len(tau)
     if not all(log.motion.sway_measured for log in compared):
         mse[:, 1] = np.nan
-    variance = np.var(tau, axis=0)
+    r2 = _r_squared(mse, tau)
+    force = np.concatenate([log.window_force for log in compared])
     with np.errstate(divide="ignore", invalid="ignore"):
-        r2 = np.where(variance > 0.0, 1.0 - mse / variance, np.nan)
+        in_windows = np.sum([log.window_sums.sum(axis=0) for log in compared], axis=0) / len(force)
+        in_windows[:, np.isnan(mse).any(axis=0)] = np.nan
         counted = [_common_runs(log, runnable) for log in compared]
         squares = np.sum(
             [np.where(use, log.errors**2, 0.0).sum(axis=1) for log, use in zip(compared, counted, strict=True)],
@@ -351,10 +399,12 @@ def _errors(
         rows=len(tau),
         seconds=float(sum(log.rows.sum() / log.motion.rate_hz for log in compared)),
         blocks=sum(len(log.sums) for log in compared),
+        windows=len(force),
         scores={
             label: ModelErrors(
                 mse=by_axis(mse[k]),
                 r2=by_axis(r2[k]),
+                prediction=PredictionErrors(by_axis(in_windows[k]), by_axis(_r_squared(in_windows, force)[k])),
                 trained=label in judged.trained,
                 free_run={key: tuple(rms[k, :, c].tolist()) for c, key in enumerate(KEYS)},
             )
@@ -372,6 +422,7 @@ def _errors(
                 first=field.labels[i],
                 second=field.labels[j],
                 mse={axis: _ratio(judged.force, k, c) for c, axis in enumerate(AXES)},
+                prediction={axis: _ratio(judged.prediction, k, c) for c, axis in enumerate(AXES)},
                 free_run={
                     key: tuple(_ratio(runs, k, c, root=True) for runs in judged.runs) for c, key in enumerate(KEYS)
                 },
@@ -379,6 +430,13 @@ def _errors(
             for k, (i, j) in enumerate(judged.force.pairs)
         ),
     )
+
+
+def _r_squared(mse: Floats, force: Floats) -> Floats:
+    """Return R² of models with mean square errors, shape (m, 3), of a force, shape (n, 3)."""
+    variance = np.var(force, axis=0) if len(force) else np.zeros(force.shape[1])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.where(variance > 0.0, 1.0 - mse / variance, np.nan))
 
 
 def _ratio(paired: PairedRatios, k: int, column: int, *, root: bool = False) -> Ratio:

@@ -50,13 +50,23 @@ class ComparedModel(Record):
 
 
 @dataclass(frozen=True)
+class PredictionErrors(Record):
+    """Mean square [N², N², N²m²] and R² of the force that makes up for errors of the acceleration in windows, by axis."""
+
+    mse: Mapping[str, float]
+    r2: Mapping[str, float]
+
+
+@dataclass(frozen=True)
 class ModelErrors(Record):
     """Errors of one model.
 
     Attributes
     ----------
     mse, r2
-        Mean square force error [N², N², N²m²] and R², by axis.
+        Mean square force error of single rows [N², N², N²m²] and R², by axis.
+    prediction
+        How far predicted accelerations are off, as forces, in windows.
     trained
         Whether the model has learnt from what it is judged on.
     free_run
@@ -65,6 +75,7 @@ class ModelErrors(Record):
 
     mse: Mapping[str, float]
     r2: Mapping[str, float]
+    prediction: PredictionErrors
     trained: bool
     free_run: Mapping[str, tuple[float, ...]]
 
@@ -112,18 +123,24 @@ class Ratio(Record):
 
 @dataclass(frozen=True)
 class ModelPair(Record):
-    """Errors of the first of two models over the second's: mean square force errors by axis, and free runs at each horizon."""
+    """Errors of the first of two models over the second's: mean squares by axis, and free runs at each horizon.
+
+    `mse` is of the force in single rows, `prediction` of the acceleration in windows.
+    """
 
     first: str
     second: str
     mse: Mapping[str, Ratio]
+    prediction: Mapping[str, Ratio]
     free_run: Mapping[str, tuple[Ratio, ...]]
 
     def inverse(self) -> ModelPair:
         """Return it with the models exchanged."""
-        mse = {axis: ratio.inverse() for axis, ratio in self.mse.items()}
+        mse, prediction = (
+            {axis: ratio.inverse() for axis, ratio in each.items()} for each in (self.mse, self.prediction)
+        )
         free_run = {key: tuple(ratio.inverse() for ratio in ratios) for key, ratios in self.free_run.items()}
-        return ModelPair(self.second, self.first, mse, free_run)
+        return ModelPair(self.second, self.first, mse, prediction, free_run)
 
 
 @dataclass(frozen=True)
@@ -134,6 +151,8 @@ class CommonErrors(Record):
     ----------
     rows, seconds, blocks
         Rows, their length [s], and blocks of them.
+    windows
+        Windows in which accelerations are predicted; none in a log without a stretch as long as a window.
     scores
         Errors of each model by its label.
     free_run
@@ -145,6 +164,7 @@ class CommonErrors(Record):
     rows: int
     seconds: float
     blocks: int
+    windows: int
     scores: Mapping[str, ModelErrors]
     free_run: FreeRunCounts
     pairs: tuple[ModelPair, ...]
@@ -199,13 +219,14 @@ class Statement(Record):
     on
         Name of the log; None for all of them together.
     kind, what, horizon_s
-        ``force`` and an axis, or ``free run``, a quantity and a horizon [s].
+        ``prediction`` (accelerations in windows) or ``force`` (single rows) and an axis, or ``free run``, a quantity and a
+        horizon [s].
     first, second
         The model that errs less, and the other.
     ratio, low, high
         Error of the first over the second's, with its 95 % interval.
     p, p_corrected
-        Probability of such a ratio by chance, by itself and among all comparisons.
+        Probability of such a ratio by chance, by itself and among all comparisons; those of ``force`` by themselves.
     better, perhaps
         The first where it is better, and where it may be; else None.
     evidence
@@ -297,6 +318,8 @@ class ComparisonResult(Record):
         Name of the vessel.
     window_s
         Smoothing window of the test data [s].
+    prediction_window_s
+        Length of the windows in which accelerations are predicted [s].
     models
         The base model first where there is one.
     warnings
@@ -312,6 +335,7 @@ class ComparisonResult(Record):
     schema: str
     vessel: str
     window_s: float
+    prediction_window_s: float
     models: tuple[ComparedModel, ...]
     warnings: tuple[str, ...]
     logs: tuple[LogErrors, ...]

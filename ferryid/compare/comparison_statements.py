@@ -17,6 +17,8 @@ QUANTITIES = ("position", "heading", "speed", "yaw rate")
 """What free runs are judged by, in the order of their errors."""
 TOLD_QUANTITIES = 2
 """How many of these have sentences; the others follow from them."""
+Cell = tuple[str, str, float | None, PairedRatios, int]
+"""Kind, axis or quantity, horizon [s], and the column of the ratios that a comparison is made of."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +32,9 @@ class PairedErrors:
     labels
         Names of the models.
     force
-        On the three axes.
+        Errors of the force in single rows, on the three axes.
+    prediction
+        Errors of the acceleration in windows, on the three axes.
     runs
         Free runs at each horizon, with the four columns of `QUANTITIES`.
     horizons_s
@@ -44,6 +48,7 @@ class PairedErrors:
     on: str | None
     labels: tuple[str, ...]
     force: PairedRatios
+    prediction: PairedRatios
     runs: tuple[PairedRatios, ...]
     horizons_s: tuple[float, ...]
     told_s: float | None
@@ -53,19 +58,24 @@ class PairedErrors:
 def comparison_statements(judged: PairedErrors) -> list[Statement]:
     """Return one entry for every two models and everything that they are compared by.
 
-    Probabilities are corrected for the number of these entries after Holm; intervals are of each by itself.
+    Probabilities are corrected for the number of these entries after Holm; intervals are of each by itself. Errors of the
+    force in single rows repeat those of the acceleration in windows, with more noise: they are corrected by themselves.
     """
-    cells: list[tuple[str, str, float | None, PairedRatios, int]] = [
-        ("force", axis, None, judged.force, column) for column, axis in enumerate(AXES)
-    ]
+    cells: list[Cell] = [("prediction", axis, None, judged.prediction, column) for column, axis in enumerate(AXES)]
     if judged.told_s is not None:
         runs = judged.runs[judged.horizons_s.index(judged.told_s)]
         cells += [("free run", name, judged.told_s, runs, k) for k, name in enumerate(QUANTITIES[:TOLD_QUANTITIES])]
+    in_rows: list[Cell] = [("force", axis, None, judged.force, column) for column, axis in enumerate(AXES)]
+    return [*_statements(judged, cells), *_statements(judged, in_rows)]
+
+
+def _statements(judged: PairedErrors, cells: Sequence[Cell]) -> list[Statement]:
+    """Return the entries of one family of comparisons."""
     corrected = holm(np.column_stack([paired.p[:, column] for *_, paired, column in cells]))
     rows = []
     for k, (i, j) in enumerate(judged.force.pairs):
         for place, (kind, what, horizon, paired, column) in enumerate(cells):
-            if kind == "free run" and not isfinite(paired.ratio[k, column]):
+            if kind != "force" and not isfinite(paired.ratio[k, column]):
                 continue
             numbers = [float(values[k, column]) for values in (paired.ratio, paired.low, paired.high)]
             rows.append(
@@ -96,8 +106,8 @@ def _statement(
     clear = known and not alike and corrected <= COMPARE.significance
     hint = known and not alike and not clear and p <= COMPARE.significance and corrected <= COMPARE.maybe
     evidence = not ((clear or hint) and first in judged.trained)
-    error = "MSE" if kind == "force" else f"{what} error"
-    place = f"on {what}" if kind == "force" else f"in {what}, run free for {horizon:g} s"
+    error = {"force": "MSE", "prediction": "prediction MSE"}.get(kind, f"{what} error")
+    place = place_of(kind, what, horizon)
     span = f" [{low:.3g}, {high:.3g}]" if known else ""
     if not isfinite(ratio):
         says = f"{first} and {second} cannot be compared {place}: one of them makes no error, or there is nothing to judge by"
@@ -136,6 +146,11 @@ def _statement(
         evidence=evidence,
         sentence=says,
     )
+
+
+def place_of(kind: str, what: str, horizon_s: float | None) -> str:
+    """Return where two models are compared, as a part of a sentence."""
+    return f"in {what}, run free for {horizon_s:g} s" if kind == "free run" else f"on {what}"
 
 
 def format_probability(p: float) -> str:

@@ -133,8 +133,9 @@ def _in_windows(
     mass = effective_mass(own, model.scale, (), np.zeros((0, 3)))
     base = old if model.diagnosed else replace(old, motion=without_inputs(old.motion))
     length_s, reduced = window_seconds(own), not profile.measures_sway
-    force, (base_error, error) = window_errors((base, new), motion, rows, mass, length_s, reduced=reduced)
-    return force, base_error, error
+    found = window_errors((base, new), motion, rows, mass, length_s, reduced=reduced)
+    base_error, error = found.errors
+    return found.force, base_error, error
 
 
 def _prediction_json(

@@ -140,7 +140,8 @@ def prediction_errors(
             predict(model, prepared, profile, window_s=settings.window_s, smoother=settings.smoother)
             for model in models
         ]
-        for own, error in zip(squares, window_errors(found, prepared.motion, wanted, mass, length_s)[1], strict=True):
+        errors = window_errors(found, prepared.motion, wanted, mass, length_s).errors
+        for own, error in zip(squares, errors, strict=True):
             own.append(error**2)
     every = [np.concatenate(own) for own in squares]
     return [one.mean(axis=0) if len(one) else np.full(3, np.nan) for one in every]

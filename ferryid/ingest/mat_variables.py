@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError, one_line
 from ferryid.ingest.log import Column, Loss
 from ferryid.ingest.mat_tables import MOST_STRUCTS, Leaf, Node
@@ -104,7 +105,8 @@ def _level_5(path: Path, content: bytes) -> MatVariables:
             result.losses.append(
                 _lost(
                     path,
-                    f"the variable at byte {position} of the MAT file holds {held} bytes of the {size} that it states",
+                    f"the variable at byte {position} of the MAT file holds {counted(held, 'byte')} of the {size} that it "
+                    "states",
                 )
             )
             after = position + 8 + held

@@ -62,7 +62,7 @@ def over_reference(pairs: Sequence[ModelPair], label: str, reference: str) -> Mo
 
 
 def mse_ratios(result: ComparisonResult, shown: Sequence[tuple[str, CommonErrors]], reference: str) -> str:
-    """Mean squared force error of every model over a reference's, per axis and log, with 95 % intervals."""
+    """Mean squared prediction error of every model over a reference's, per axis and log, with 95 % intervals."""
     look = looks(result.models)
     labels = [label for label in result.labels if label != reference]
     rows = len(shown) * (len(labels) + 1)
@@ -82,7 +82,7 @@ def mse_ratios(result: ComparisonResult, shown: Sequence[tuple[str, CommonErrors
                         title, (0.02, top), xycoords=("axes fraction", "data"), fontsize=9, va="center", bbox=box
                     )
                 for k, label in enumerate(labels):
-                    ratio = over_reference(scope.pairs, label, reference).mse[axis]
+                    ratio = over_reference(scope.pairs, label, reference).prediction[axis]
                     if not isfinite(ratio.value):
                         continue
                     y = top - 1 - k
@@ -106,7 +106,7 @@ def mse_ratios(result: ComparisonResult, shown: Sequence[tuple[str, CommonErrors
             ax.set_title(axis, fontsize=10)
             ax.set_yticks([])
             ax.set_ylim(-rows + 0.4, 0.6)
-        panels[1].set_xlabel(f"MSE over that of {reference}")
+        panels[1].set_xlabel(f"prediction MSE over that of {reference}")
         legend_above(figure, panels[0], 3)
         return svg_text(figure)
 

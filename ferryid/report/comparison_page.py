@@ -57,7 +57,7 @@ def render(
         models=[(model.label, comparison_words.model_line(model)) for model in result.models],
         overall=overall,
         sections=sections,
-        about_p=comparison_words.ABOUT_P if known else "",
+        about_p=comparison_words.about_errors(result) if known else "",
         omitted=f"Not drawn, but part of every number: {', '.join(left)}." if left else "",
         labels=labels,
         coefficients=[_row(*row, labels) for row in comparison_words.coefficient_table(result)],
@@ -76,8 +76,9 @@ def _overall(
         {
             "file": "mse-ratios",
             "svg": comparison_figures.mse_ratios(result, shown, reference),
-            "caption": f"Mean squared force error over that of {reference}, with 95 % intervals from blocks of each log, in "
-            "pairs; left of the line is better. Hollow marks have too few blocks for an interval.",
+            "caption": f"Mean squared prediction error in windows of {result.prediction_window_s:.3g} s over that of "
+            f"{reference}, with 95 % intervals from blocks of each log, in pairs; left of the line is better. Hollow marks "
+            "have too few blocks for an interval.",
         }
     ]
     if any(scope.free_run.counted):

@@ -58,7 +58,7 @@ def as_text(result: ComparisonResult) -> str:
         lines += [f"  {sentence}" for sentence in comparison_words.sentences(result, on)]
         lines += [f"  warning: {warning}" for warning in comparison_words.warnings_of(scope)]
     if result.logs:
-        lines += ["", comparison_words.ABOUT_P]
+        lines += ["", comparison_words.about_errors(result)]
     lines += ["", *_coefficient_table(result)]
     effects = render_effects(result.effects)
     return "\n".join([*lines, *(["", *effects] if effects else [])])

@@ -15,6 +15,7 @@ from ferryid.compare import (
     LogErrors,
     Statement,
     is_of_a_hull,
+    place_of,
 )
 from ferryid.counts import counted
 from ferryid.effects import effects
@@ -24,12 +25,21 @@ from ferryid.types import AXES
 MANY = 4
 """With this many models or more, the base model among them, sentences hold each against the best, not every two."""
 ALL = "all logs"
+ABOUT_ERRORS = (
+    "Errors on an axis are of the predicted acceleration, as a force, averaged over windows of {window_s:.3g} s: what a fit is "
+    "judged by. Those of the force in single rows, mostly noise, are in the JSON."
+)
 ABOUT_P = (
     "p: how likely a ratio this far from one is if both err alike (bootstrap of blocks of each log, in pairs), corrected for "
     "the number of comparisons on a log (Holm). Intervals are 95 %, of each ratio by itself, so that of many some miss 1 by "
     "chance. They hold the scatter within these logs, not what another day brings. Free: rms error after a "
     "free run of so long."
 )
+
+
+def about_errors(result: ComparisonResult) -> str:
+    """Return what the errors are of, and what their probabilities mean."""
+    return f"{ABOUT_ERRORS.format(window_s=result.prediction_window_s)} {ABOUT_P}"
 
 
 def scopes(result: ComparisonResult) -> list[tuple[str | None, str, CommonErrors]]:
@@ -42,7 +52,8 @@ def about(scope: CommonErrors) -> str:
     """Return how much there is to judge by."""
     length = f" of {scope.block_s:.3g} s" if isinstance(scope, LogErrors) else ""
     return (
-        f"{counted(scope.rows, 'row')}, {scope.seconds:.0f} s, {counted(scope.blocks, 'block')}{length}, "
+        f"{counted(scope.rows, 'row')}, {scope.seconds:.0f} s, {counted(scope.windows, 'window')}, "
+        f"{counted(scope.blocks, 'block')}{length}, "
         f"{counted(scope.free_run.starts, 'free run')}"
     )
 
@@ -55,19 +66,26 @@ def warnings_of(scope: CommonErrors) -> tuple[str, ...]:
 def sentences(result: ComparisonResult, on: str | None) -> list[str]:
     """Return what is better than what on a log, or on all; differences that were not shown in one sentence for two models."""
     labels = result.labels
-    rows = [row for row in result.statements if row.on == on]
+    told = (_on_axes(result, on), "free run")
+    rows = [row for row in result.statements if row.on == on and row.kind in told]
     if len(labels) >= MANY:
         rows = [row for row in rows if _best(rows, row) in (row.first, row.second)]
     # The models that were asked about come before their base model.
     rows.sort(key=lambda row: BASE in (row.first, row.second))
-    told = [row.sentence for row in rows if row.better] + [row.sentence for row in rows if row.perhaps]
+    shown = [row.sentence for row in rows if row.better] + [row.sentence for row in rows if row.perhaps]
     unclear = [row for row in rows if not (row.better or row.perhaps)]
     if len(labels) >= MANY:
-        return told + _by_quantity(unclear)
+        return shown + _by_quantity(unclear)
     pairs: dict[frozenset[str], list[Statement]] = {}
     for row in unclear:
         pairs.setdefault(frozenset((row.first, row.second)), []).append(row)
-    return told + [same[0].sentence if len(same) == 1 else _together(same, labels) for same in pairs.values()]
+    return shown + [same[0].sentence if len(same) == 1 else _together(same, labels) for same in pairs.values()]
+
+
+def _on_axes(result: ComparisonResult, on: str | None) -> str:
+    """Return the kind of the statements on axes that count: of accelerations in windows, of forces where no window fits."""
+    scope = next(scope for key, _, scope in scopes(result) if key == on)
+    return "prediction" if scope.windows else "force"
 
 
 def _by_quantity(rows: Sequence[Statement]) -> list[str]:
@@ -78,7 +96,7 @@ def _by_quantity(rows: Sequence[Statement]) -> list[str]:
             groups.setdefault((row.kind, row.what), []).append(row)
     told = []
     for (kind, what), same in groups.items():
-        place = f"on {what}" if kind == "force" else f"in {what}, run free for {same[0].horizon_s:g} s"
+        place = place_of(kind, what, same[0].horizon_s)
         others = [f"{row.second} {number(row.ratio)}{_span(row.low, row.high)}" for row in same]
         says = "no difference is shown" if isfinite(same[0].low) else "there is too little data to decide"
         told.append(f"{place}, {same[0].first} errs least, but {says}: its error over that of {listed(others)}")
@@ -124,9 +142,12 @@ def headline(result: ComparisonResult) -> str:
     if not known:
         return f"{counted(len(result.models), 'model')} by their coefficients alone: no log was given to judge them on."
     on, title, scope = known[-1]
+    kind = _on_axes(result, on)
     groups: dict[tuple[str, str], list[str]] = {}
     for axis in AXES:
-        rows = [row for row in result.statements if (row.on, row.kind, row.what) == (on, "force", axis)]
+        rows = [row for row in result.statements if (row.on, row.kind, row.what) == (on, kind, axis)]
+        if not rows:
+            continue
         if scope.scores and all(isnan(scores.mse[axis]) for scores in scope.scores.values()):
             continue  # nothing was measured there
         best = _best(rows, rows[0])
@@ -143,18 +164,20 @@ def headline(result: ComparisonResult) -> str:
     if BASE in result.labels and len(result.labels) > 1:
         shown = [
             row for row in result.statements
-            if (row.on, row.kind, row.second) == (on, "force", BASE) and row.better and row.evidence
+            if (row.on, row.kind, row.second) == (on, kind, BASE) and row.better and row.evidence
         ]  # fmt: skip
         free = {
             row.first for row in result.statements
-            if (row.on, row.second) == (on, BASE) and row.kind != "force" and row.better and row.evidence
+            if (row.on, row.kind, row.second) == (on, "free run", BASE) and row.better and row.evidence
         }  # fmt: skip
         if not shown and free:
-            kept = "No fitted model is shown to have less force error than the profile's hull, but run free "
+            kept = "No fitted model is shown to have less prediction error than the profile's hull, but run free "
             kept += f"{listed(sorted(free))} {'is' if len(free) == 1 else 'are'} better. "
         elif not shown:
             kept = "No fitted model is shown to be better than the profile's hull: keep the hull. "
-    return f"{kept}Least force error, {title}: {'; '.join(told)}."
+    if not told:
+        return f"{kept}No error could be compared on {title}."
+    return f"{kept}Least {kind} error, {title}: {'; '.join(told)}."
 
 
 def told_horizon(scope: CommonErrors) -> int:
@@ -190,14 +213,15 @@ def score_columns(scope: CommonErrors) -> list[str]:
 
 
 def score_rows(result: ComparisonResult, scope: CommonErrors) -> list[tuple[str, list[str]]]:
-    """Return for every model: rms error and R² per axis, and how far it strays in position and heading when run free."""
+    """Return for every model: rms error and R² per axis, in windows where any fits, and how far it strays when run free."""
     h = told_horizon(scope)
     rows = []
     for label in result.labels:
         scores = scope.scores[label]
+        errors = scores.prediction if scope.windows else scores
         cells = [
-            *(number(scores.mse[axis] ** 0.5) for axis in AXES),
-            *(number(scores.r2[axis], ".3f") for axis in AXES),
+            *(number(errors.mse[axis] ** 0.5) for axis in AXES),
+            *(number(errors.r2[axis], ".3f") for axis in AXES),
             number(scores.free_run["position_m"][h]),
             number(degrees(scores.free_run["heading_rad"][h])),
         ]

@@ -16,12 +16,16 @@ from ferryid.errors import FerryIdError
 from ferryid.files import dump_json
 from ferryid.models.model import Model, blank_model
 from ferryid.models.prediction.log_prediction import predict
+from ferryid.models.prediction.window_averages import window_errors
 from ferryid.models.scores import usable_rows
+from ferryid.report import comparison_words
+from ferryid.report.comparison_figures import over_reference
 from ferryid.signals.prepare import prepare
 from ferryid.simulate import load_scenario, simulate, write_log
 from ferryid.types import RunContext
 from ferryid.vessel import load_profile
 from tests.export.models import fitted
+from tests.models.test_stored_effect import stored
 
 pytestmark = pytest.mark.slow
 
@@ -103,7 +107,8 @@ def test_errors_are_those_that_one_sums_by_hand(field: CandidateSet, folder: Pat
 
 
 def test_the_true_model_is_found_better(compared: Comparison) -> None:
-    told = {(row.what, row.first, row.second): row for row in compared.result.statements if row.on is None}
+    rows = [row for row in compared.result.statements if row.on is None]
+    told = {(row.what, row.first, row.second): row for row in rows if row.kind != "force"}
     row = told["sway", BASE, "ferry@2"]
     assert row.better == BASE
     assert row.p <= row.p_corrected <= 0.05
@@ -111,9 +116,52 @@ def test_the_true_model_is_found_better(compared: Comparison) -> None:
     assert row.sentence.startswith(f"{BASE} is better than ferry@2 on sway (p 0.")
     assert "of the other's [" in row.sentence
     assert told["sway", "ferry@1", "ferry@2"].better == "ferry@1"
-    # Nine comparisons of forces and six of free runs: each p is raised, and none beyond their number.
+    # Nine comparisons of accelerations and six of free runs: each p is raised, and none beyond their number.
     assert len(told) == 15
     assert all(row.p_corrected <= 15 * row.p for row in told.values())
+    forces = [row for row in rows if row.kind == "force"]
+    assert len(forces) == 9
+    assert all(row.p_corrected <= 9 * row.p for row in forces)
+
+
+def test_predictions_are_judged_in_windows_that_all_share(
+    field: CandidateSet, folder: Path, compared: Comparison
+) -> None:
+    squares, forces = [], []
+    for log, entry in zip(logs_in(folder), compared.result.logs, strict=True):
+        prepared = prepare(log, FERRY, folder / "out", window_s=1.0)
+        motion, length = prepared.motion, compared.result.prediction_window_s
+        seen = [predict(one.model, prepared, FERRY, window_s=1.0, smoother="square") for one in field.candidates]
+        rows = usable_rows(motion, *(one.tau for one in seen))
+        found = window_errors(seen, motion, rows, FERRY.hull.M, length)
+        assert entry.windows == len(found.force)
+        for one, error in zip(field.candidates, found.errors, strict=True):
+            assert list(entry.scores[one.label].prediction.mse.values()) == pytest.approx(
+                np.mean(error**2, axis=0).tolist()
+            )
+        squares.append(np.array([np.sum(error**2, axis=0) for error in found.errors]))
+        forces.append(found.force)
+    pooled, every = compared.result.pooled, np.concatenate(forces)
+    assert pooled is not None
+    total = sum(squares)
+    r2 = 1.0 - total[1] / len(every) / every.var(axis=0)
+    assert list(pooled.scores["ferry@1"].prediction.r2.values()) == pytest.approx(r2.tolist())
+    pair = next(one for one in pooled.pairs if (one.first, one.second) == ("ferry@1", "ferry@2"))
+    assert pair.prediction["yaw"].value == pytest.approx(total[1, 2] / total[2, 2])
+    assert pair.inverse().prediction["yaw"].value == pytest.approx(total[2, 2] / total[1, 2])
+
+
+def test_half_the_thrust_on_half_the_hull_predicts_alike(folder: Path) -> None:
+    """Errors of the force count in a model's own thrust: half of it on half the hull has a quarter of the mean square."""
+    halves = tuple(stored("thruster_gain", one.name, factor=0.5) for one in FERRY.actuators)
+    whole, half = heavier(1, 1.3), replace(heavier(2, 0.65), vessel_effects=halves)
+    result = compare(
+        select_candidates(["ferry@1", "ferry@2"], [whole, half]), logs_in(folder)[:1], RunContext(folder / "out")
+    ).result
+    pair = over_reference(result.logs[0].pairs, "ferry@2", "ferry@1")
+    assert [ratio.value for ratio in pair.mse.values()] == pytest.approx([0.25] * 3, rel=0.05)
+    assert [ratio.value for ratio in pair.prediction.values()] == pytest.approx([1.0] * 3, rel=0.05)
+    assert "ferry@2" not in comparison_words.headline(result).split("chance")[0]
 
 
 def test_the_json_comes_back_as_it_was(compared: Comparison) -> None:

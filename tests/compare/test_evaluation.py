@@ -130,13 +130,13 @@ def test_a_mass_that_cannot_be_inverted_errs_without_end_and_takes_no_row(fitted
     theta[model.terms.index("u_dot"), 0] = -1e6
     two = [Prediction(motion.tau, motion, model_estimator(one)) for one in (model, replace(model, theta=theta))]
     mass = np.diag([2000.0, 2000.0, 5000.0])
-    force, (good, bad) = window_errors(two, motion, motion.valid, mass, 8.0)
+    force, (good, bad), _ = window_errors(two, motion, motion.valid, mass, 8.0)
     alone = window_errors(two[:1], motion, motion.valid, mass, 8.0)
     assert len(force) > 10
     np.testing.assert_array_equal(good, alone[1][0])
     assert np.isinf(bad).all()
     # Without sway the errors are those of a hull that cannot sway.
-    _, (reduced,) = window_errors(two[:1], motion, motion.valid, mass, 8.0, reduced=True)
+    (reduced,) = window_errors(two[:1], motion, motion.valid, mass, 8.0, reduced=True).errors
     np.testing.assert_allclose(reduced[:, 0], good[:, 0], rtol=1e-9)
     assert not np.allclose(reduced[:, 2], good[:, 2], rtol=1e-6)
 

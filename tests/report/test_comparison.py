@@ -37,20 +37,23 @@ def model(label: str) -> ComparedModel:
 
 
 def result(
-    labels: tuple[str, ...], p: float, trained: frozenset[str] = frozenset(), step: float = 1.3
+    labels: tuple[str, ...], p: float, trained: frozenset[str] = frozenset(), step: float = 1.3, windows: int = 4
 ) -> ComparisonResult:
     """Return a comparison in which every model errs `step` times more than the one before."""
     m = len(labels)
     size = {(i, j): step ** (i - j) for i in range(m) for j in range(i + 1, m)}
-    judged = PairedErrors("log", labels, paired(size, p, m, 3), (paired(size, p, m, 4),) * 2, HORIZONS, 30.0, trained)
+    # Errors of single rows say the opposite of those in windows, and do not count.
+    axes, wrong = paired(size, p, m, 3), paired({pair: 1.0 / value for pair, value in size.items()}, p, m, 3)
+    judged = PairedErrors("log", labels, wrong, axes, (paired(size, p, m, 4),) * 2, HORIZONS, 30.0, trained)
     runs = FreeRunCounts(HORIZONS, 30.0, 3, (3, 3), (9, 9))
     return ComparisonResult(
         schema="ferryid.compare/1",
         vessel="ferry",
         window_s=1.0,
+        prediction_window_s=8.0,
         models=tuple(map(model, labels)),
         warnings=(),
-        logs=(LogErrors("log", "", 30.0, 10, 1.0, 9, {}, runs, (), None, ()),),
+        logs=(LogErrors("log", "", 30.0, 10, 1.0, 9, windows, {}, runs, (), None, ()),),
         pooled=None,
         statements=tuple(comparison_statements(judged)),
         coefficients=Coefficients((), ()),
@@ -60,7 +63,10 @@ def result(
 
 def test_what_is_better_is_said_with_its_ratio_and_chance() -> None:
     said = comparison_words.sentences(result(("one", "two"), 0.001), "log")
-    assert said[0] == "one is better than two on surge (p 0.005): its MSE is 0.769 of the other's [0.692, 0.846]"
+    assert (
+        said[0]
+        == "one is better than two on surge (p 0.005): its prediction MSE is 0.769 of the other's [0.692, 0.846]"
+    )
     # Errors of free runs are not squared.
     assert "one is better than two in heading, run free for 30 s (p 0.005): its heading error is 0.877 of" in said[4]
     assert len(said) == 5
@@ -76,7 +82,7 @@ def test_the_better_one_comes_first_whichever_was_named_first() -> None:
 def test_what_the_number_of_comparisons_makes_doubtful_may_be() -> None:
     said = comparison_words.sentences(result(("one", "two"), 0.03), "log")
     assert said[0].startswith(
-        "one may be better than two on surge (p 0.03 by itself, 0.15 among all): its MSE is 0.769"
+        "one may be better than two on surge (p 0.03 by itself, 0.15 among all): its prediction MSE is 0.769"
     )
 
 
@@ -92,7 +98,7 @@ def test_what_is_not_shown_is_one_sentence_for_two_models() -> None:
 def test_alike_is_what_differs_by_next_to_nothing_however_surely() -> None:
     row = result(("one", "two"), 0.0001, step=1.004).statements[0]
     assert row.better is None
-    assert row.sentence == "one and two are alike on surge: their MSE differs by less than 0.5%"
+    assert row.sentence == "one and two are alike on surge: their prediction MSE differs by less than 0.5%"
 
 
 def test_many_models_are_held_against_the_best() -> None:
@@ -120,18 +126,30 @@ def test_what_has_seen_the_log_is_no_evidence() -> None:
 def test_the_headline_says_who_errs_least_and_how_surely(p: float, told: str) -> None:
     headline = comparison_words.headline(result(("one", "two", BASE), p))
     assert headline.endswith(told)
-    advice = "No fitted model is shown to be better than the profile's hull: keep the hull. Least force error"
+    advice = "No fitted model is shown to be better than the profile's hull: keep the hull. Least prediction error"
     assert headline.startswith(advice) == (p > 0.05)
     assert "keep the hull" not in comparison_words.headline(result(("one", "two"), p))
+
+
+def test_without_a_window_the_force_in_single_rows_is_what_counts() -> None:
+    found = result(("one", "two"), 0.001, windows=0)
+    assert comparison_words.headline(found).startswith("Least force error, log: two on surge, sway and yaw, beyond")
+    said = comparison_words.sentences(found, "log")
+    assert len(said) == 5
+    assert any(one.startswith("two is better than one on surge (p 0.003): its MSE is") for one in said)
 
 
 def test_too_few_blocks_are_too_little_data() -> None:
     few = np.random.default_rng(1).gamma(3.0, 1.0, (3, 2, 3))
     runs = compare_pairs([few[:, :, [0, 1, 2, 0]]])
-    judged = PairedErrors("log", ("one", "two"), compare_pairs([few]), (runs, runs), HORIZONS, None, frozenset())
+    judged = PairedErrors(
+        "log", ("one", "two"), *(compare_pairs([few]),) * 2, (runs, runs), HORIZONS, None, frozenset()
+    )
     rows = comparison_statements(judged)
     # Without a horizon that has intervals, free runs have no sentence.
-    assert [row.what for row in rows] == ["surge", "sway", "yaw"]
+    assert [(row.kind, row.what) for row in rows] == [
+        (kind, axis) for kind in ("prediction", "force") for axis in ("surge", "sway", "yaw")
+    ]
     assert all(row.sentence.startswith("too little data to distinguish") for row in rows)
 
 
@@ -153,9 +171,10 @@ def test_no_two_of_many_models_look_alike() -> None:
 
 def test_a_ratio_over_a_reference_is_turned_round_with_its_interval() -> None:
     ratio = Ratio(2.0, 1.6, 4.0, 0.1)
-    pair = ModelPair(BASE, "one", {"sway": ratio}, {"position_m": (ratio,)})
+    pair = ModelPair(BASE, "one", {"sway": ratio}, {"yaw": ratio}, {"position_m": (ratio,)})
     turned = over_reference([pair], "one", BASE)
     assert turned.mse["sway"] == Ratio(0.5, 0.25, 0.625, 0.1)
+    assert turned.prediction["yaw"] == turned.mse["sway"]
     assert turned.free_run["position_m"] == (turned.mse["sway"],)
     assert over_reference([pair], BASE, "one") is pair
 

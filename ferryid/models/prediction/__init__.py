@@ -12,7 +12,7 @@ from ferryid.models.prediction.free_run import (
     starting_points,
 )
 from ferryid.models.prediction.log_prediction import Prediction, predict, predict_base, predict_with_effects, signal_map
-from ferryid.models.prediction.window_averages import window_errors, window_scores
+from ferryid.models.prediction.window_averages import WindowErrors, window_errors, window_scores
 
 __all__ = [
     "HORIZONS_S",
@@ -20,6 +20,7 @@ __all__ = [
     "FreeRun",
     "Prediction",
     "SingleRuns",
+    "WindowErrors",
     "predict",
     "predict_base",
     "predict_with_effects",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +16,25 @@ from ferryid.signals.track import Motion, segments
 from ferryid.types import Flags, Floats
 
 
+class WindowErrors(NamedTuple):
+    """Errors of several predictions in J windows that all share.
+
+    Attributes
+    ----------
+    force
+        Applied force [N, N, N·m], shape (J, 3).
+    errors
+        How far the acceleration of each prediction is off, as a force, shape (J, 3) each; infinite for a model whose mass
+        matrix cannot be inverted.
+    starts_s
+        When each window starts [s], shape (J,).
+    """
+
+    force: Floats
+    errors: list[Floats]
+    starts_s: Floats
+
+
 def window_errors(
     predictions: Sequence[Prediction],
     motion: Motion,
@@ -23,7 +43,7 @@ def window_errors(
     length_s: float,
     *,
     reduced: bool = False,
-) -> tuple[Floats, list[Floats]]:
+) -> WindowErrors:
     """Return the applied force and how far predicted accelerations are off, averaged over windows that all share.
 
     Parameters
@@ -39,11 +59,7 @@ def window_errors(
     reduced
         Whether sway was not measured: it then neither errs nor couples.
 
-    Returns
-    -------
-    tuple
-        Force [N, N, N·m], shape (J, 3), and the errors of each prediction, shape (J, 3) each; infinite for a model whose mass
-        matrix cannot be inverted, which takes no row from the others.
+    A model whose mass matrix cannot be inverted takes no row from the others.
     """
     mass = without_sway_coupling(mass) if reduced else mass
     expected = [predicted_acceleration(one.force, one.motion, coupled_sway=not reduced) for one in predictions]
@@ -57,7 +73,7 @@ def window_errors(
     for one, acceleration, some in zip(predictions, expected, known, strict=True):
         error = window_sums(acceleration, weight, starts) + window_sums(one.motion.nu, slope, starts)
         errors.append(error @ mass.T if some.any() else np.full_like(error, np.inf))
-    return window_sums(motion.tau, weight, starts), errors
+    return WindowErrors(window_sums(motion.tau, weight, starts), errors, motion.t[starts])
 
 
 def window_scores(force: Floats, base: Floats, model: Floats) -> ForceScores:
