@@ -49,6 +49,7 @@ from ferryid.regression.resampling import (
     paired_block_seconds,
     sum_over_blocks,
 )
+from ferryid.signals.copies import GivenLogs
 from ferryid.signals.prepare import Prepared, prepare
 from ferryid.signals.track import Motion
 from ferryid.types import AXES, Flags, Floats, RunContext, by_axis
@@ -145,9 +146,10 @@ def compare(
     """
     check_window(window_s)
     compared: list[ComparedLog] = []
+    given = GivenLogs()
     for path in logs:
         run.progress(f"comparing on {Path(path).name}")
-        compared.append(_compare_log(field, path, run, window_s, compared))
+        compared.append(_compare_log(field, path, run, window_s, given, [log.name for log in compared]))
     run.progress("comparing")
     runnable, notes = _models_that_run(field.candidates, compared)
     judged = [_pair_errors(field, [log], runnable) for log in compared]
@@ -198,13 +200,12 @@ def _model(candidate: Candidate) -> ComparedModel:
 
 
 def _compare_log(
-    field: CandidateSet, path: str, run: RunContext, window_s: float, before: Sequence[ComparedLog]
+    field: CandidateSet, path: str, run: RunContext, window_s: float, given: GivenLogs, before: Sequence[str]
 ) -> ComparedLog:
     diagnosed = any(one.model.diagnosed for one in field.candidates)
     prepared = prepare(path, field.profile, run.tables, window_s=window_s, keep_track=diagnosed, ranges=run.ranges)
     motion, sha256 = prepared.motion, prepared.recording.sha256
-    if sha256 in [other.sha256 for other in before]:
-        raise FerryIdError(f"{path}: the same log as another, which would count twice. Fix: give it once")
+    given.add(prepared.recording)
     seen = [_prediction(one, prepared, field, window_s) for one in field.candidates]
     taus = np.stack([prediction.tau for prediction in seen])
     rows = _common_rows(field, motion, taus)
@@ -236,7 +237,7 @@ def _compare_log(
         warnings.append(
             f"squared errors stay correlated for longer than blocks of {block_s:.3g} s: its intervals are probably too narrow"
         )
-    name = motion.log if motion.log not in [other.name for other in before] else f"{motion.log} ({len(before) + 1})"
+    name = motion.log if motion.log not in before else f"{motion.log} ({len(before) + 1})"
     return ComparedLog(
         name=name,
         sha256=sha256,

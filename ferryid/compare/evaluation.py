@@ -14,6 +14,7 @@ from ferryid.identify import check_window
 from ferryid.models import RANGE_UNITS, ForceScores, Model, StoredEffect, force_scores, outside_ranges, usable_rows
 from ferryid.models.forces import effective_mass, without_inputs
 from ferryid.models.prediction import Prediction, predict, predict_base, signal_map, window_errors, window_scores
+from ferryid.signals.copies import GivenLogs
 from ferryid.signals.prepare import prepare
 from ferryid.signals.time_ranges import shares_data
 from ferryid.signals.track import Motion
@@ -59,6 +60,7 @@ def evaluate(
     window = float(model.settings["window_s"]) if window_s is None else window_s
     smoother = str(model.settings.get("smoother", "square"))
     entries, parts, windows = [], [], []
+    given = GivenLogs()
     for path in logs:
         run.progress(f"evaluating on {Path(path).name}")
         prepared = prepare(
@@ -71,6 +73,7 @@ def evaluate(
             keep_track=model.diagnosed,
             ranges=run.ranges,
         )
+        given.add(prepared.recording)
         motion = prepared.motion
         old = predict_base(model, prepared, profile, window_s=window, smoother=smoother)
         # A model that adds nothing is its base model: the free run takes longer than all else and is not done twice.

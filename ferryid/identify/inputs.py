@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ferryid.identify.settings import FitSettings
-from ferryid.signals.prepare import Opened, open_track, refuse_twice
+from ferryid.signals.copies import GivenLogs
+from ferryid.signals.prepare import Opened, open_track
 from ferryid.types import RunContext
 from ferryid.vessel.profile import Profile
 
@@ -19,11 +20,10 @@ def read_logs(paths: Sequence[str], profile: Profile, settings: FitSettings, run
     FerryIdError
         For a log that cannot be used, and one that is given twice.
     """
-    opened = []
+    opened, given = [], GivenLogs()
     for path in paths:
         run.progress(f"reading {Path(path).name}")
-        opened.append(
-            open_track(path, profile, run.tables, rate_hz=settings.rate_hz, verify=run.verify, ranges=run.ranges)
-        )
-    refuse_twice(opened)
+        one = open_track(path, profile, run.tables, rate_hz=settings.rate_hz, verify=run.verify, ranges=run.ranges)
+        given.add(one.recording)
+        opened.append(one)
     return opened

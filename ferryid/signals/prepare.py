@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,6 @@ import numpy as np
 
 from ferryid.errors import FerryIdError
 from ferryid.signals.align import align
-from ferryid.signals.copies import same_recording
 from ferryid.signals.data_quality import left_out_sentences
 from ferryid.signals.faults import Faults
 from ferryid.signals.quality import POSE
@@ -168,24 +167,3 @@ def smoothed(opened: Opened, window_s: float, smoother: str = "square", *, keep_
     motion = smooth_measured(opened.measured, window_s, smoother)
     quality = data_quality(opened.recording, motion)
     return Prepared(opened.recording, motion, quality, opened.doubts, opened.track if keep_track else None)
-
-
-def refuse_twice(opened: Sequence[Opened]) -> None:
-    """Refuse a log that is given twice: it would train and validate on the same data."""
-    seen: dict[str, str] = {}
-    for k, one in enumerate(opened):
-        first = seen.get(one.recording.sha256)
-        if first is not None:
-            raise FerryIdError(
-                f"{one.recording.files[0]}: the same log as {first}, so that it would judge itself. Fix: give it once"
-            )
-        for other in opened[:k]:
-            if same_recording(one.recording, other.recording):
-                raise FerryIdError(
-                    f"{one.recording.files[0]}: holds the recording of {other.recording.files[0]}, or a piece of it, so that "
-                    "it would judge itself. Fix: give one of the two"
-                )
-        seen[one.recording.sha256] = one.recording.files[0]
-    files = [file for one in opened for file in {str(Path(file).resolve()) for file in one.recording.files}]
-    if shared := sorted({file for file in files if files.count(file) > 1}):
-        raise FerryIdError(f"{shared[0]}: is part of two logs, so that it would judge itself. Fix: give it once")

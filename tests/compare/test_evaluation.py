@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from ferryid.compare import evaluate
+from ferryid.errors import FerryIdError
 from ferryid.files import dump_json
 from ferryid.identify import FitOutcome, FitSettings, fit_logs
 from ferryid.identify.fit_data import Coefficients
@@ -153,3 +154,11 @@ def test_a_model_that_adds_nothing_needs_no_second_free_run(tmp_path: Path, monk
     once = told()
     monkeypatch.setattr(Model, "blank", False)
     assert told() == once
+
+
+def test_a_copy_in_another_format_is_no_second_log(tmp_path: Path) -> None:
+    model = blank_model(load_profile("milliampere"), "ferry")
+    with pytest.raises(
+        FerryIdError, match=r"short\.bag: holds the recording of .*short\.mcap, or a piece of it.*Fix: "
+    ):
+        evaluate(model, [str(LOG), str(LOG.with_suffix(".bag"))], RunContext(tmp_path))

@@ -15,7 +15,8 @@ from ferryid.identify import inputs
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.sweeps.settings_sweep import Sweep, sweep_json, sweep_settings
 from ferryid.report.sweep_text import headline, render_sweep
-from ferryid.signals.prepare import Opened, open_track, refuse_twice
+from ferryid.signals.copies import GivenLogs
+from ferryid.signals.prepare import Opened, open_track
 from ferryid.signals.smooth import Measured
 from ferryid.types import RunContext
 from tests.identify.rounds import PROFILE, recorded_as
@@ -173,8 +174,20 @@ def test_a_log_given_twice_is_refused(run: Run, opened: Opened, monkeypatch: pyt
 
 def test_a_part_of_two_logs_is_refused() -> None:
     part, whole = (
-        SimpleNamespace(recording=SimpleNamespace(sha256=name, files=files, streams={}))
+        SimpleNamespace(sha256=name, files=files, streams={})
         for name, files in (("1", ("a.bag",)), ("2", ("b.bag", "./a.bag")))
     )
+    given = GivenLogs()
+    given.add(part)  # type: ignore[arg-type]
     with pytest.raises(FerryIdError, match=r"a\.bag: is part of two logs.*Fix: "):
-        refuse_twice([part, whole])  # type: ignore[list-item]
+        given.add(whole)  # type: ignore[arg-type]
+
+
+def test_the_options_for_a_fit_hold_what_is_not_usual(run: Run) -> None:
+    settings = replace(SETTINGS, structure="coupled", delta=0.9)
+    found = run("components", [measured(1, seconds=50.0)], settings)
+    options = dict(zip(found.fit_options[::2], found.fit_options[1::2], strict=True))
+    assert options["--structure"] == "coupled"
+    assert options["--delta"] == "0.9"
+    assert options["--sigma"] == "0.4"
+    assert not {"--basis", "--zeta", "--smoother", "--inertia", "--rate"} & set(options)

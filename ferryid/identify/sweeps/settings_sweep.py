@@ -31,6 +31,11 @@ from ferryid.vessel.profile import Profile
 KINDS = ("components", "window", "both")
 
 SCHEMA = "ferryid.sweep/1"
+_ALSO = {
+    "--basis": "basis", "--structure": "structure", "--smoother": "smoother", "--residual": "residual", "--rate": "rate_hz",
+    "--inertia": "inertia", "--delta": "delta", "--sigma": "sigma", "--zeta": "zeta",
+}  # fmt: skip
+"""Options of a sweep that a fit has as well, and their settings."""
 BY = {"blocks": "contiguous stretches of every log", "logs": "whole logs"}
 
 
@@ -93,11 +98,18 @@ class Sweep:
 
     @property
     def fit_options(self) -> tuple[str, ...]:
-        """Options with which ``ferryid fit`` uses the choice."""
+        """Options with which ``ferryid fit`` uses the choice, and what else of the settings is not the usual."""
         window = "--weak-window" if self.weak else "--window"
+        usual = FitSettings()
+        others = [
+            (option, getattr(self.settings, name))
+            for option, name in _ALSO.items()
+            if getattr(self.settings, name) != getattr(usual, name)
+        ]
         return (
             "--estimator", self.settings.estimator, window, f"{self.choice.window_s:g}",
             "--components", str(self.choice.components),
+            *(word for option, value in others for word in (option, f"{value:g}" if isinstance(value, float) else str(value))),
         )  # fmt: skip
 
 
