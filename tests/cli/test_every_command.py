@@ -161,14 +161,17 @@ def test_the_logs_of_a_comparison_are_given_in_several_ways(
     models, comparison = ("compare", "milliampere@1", "milliampere@2"), conforms(compared.out)
     again = ferryid(*models, "--on", log, "--on", other, "--out", out, "--json", tmp_path / "again.json")
     assert conforms((tmp_path / "again.json").read_text(encoding="utf-8")) == comparison
-    # A log of eighteen seconds, as the logs are what is looked at.
+    # A log of eighteen seconds, as the logs are what is looked at; the same trial as the first, whole, would be refused.
     cut = fixtures / "truncated.mcap"
-    text = ferryid(*models, f"--on={log}", cut, "--out", out, "--json", tmp_path / "cut.json").out
+    text = ferryid(*models, f"--on={cut}", other, "--out", out, "--json", tmp_path / "cut.json").out
     told = conforms((tmp_path / "cut.json").read_text(encoding="utf-8"))
-    assert [entry["name"] for entry in told["logs"]] == ["short", "truncated"]
+    assert [entry["name"] for entry in told["logs"]] == ["truncated", "second"]
+    twice = ferryid(*models, "--on", log, cut, "--out", out)
+    assert twice.code == 2
+    assert "truncated.mcap: holds the recording of" in twice.err
     for printed, report in ((again.out, comparison["report"]), (text, told["report"])):
         assert f"report  {report}" in printed
-        assert "warning: milliampere@1 was trained on this log: its scores here are no evidence" in printed
+    assert "warning: milliampere@1 was trained on this log: its scores here are no evidence" in again.out
 
 
 @pytest.mark.draws

@@ -101,7 +101,7 @@ def test_evaluate_compare_and_export_leave_the_rows_out_and_count_them(ferryid: 
     assert entry["rows"] <= 20 * (600 - LOST)
     assert counted(" ".join(entry["warnings"]))
     assert ferryid("fit", log, *VESSEL, *out, "--components", "1", "--no-report").code == 0
-    run = ferryid("compare", "milliampere@1", "milliampere@2", "--on", log, place / "whole.mcap", *out)
+    run = ferryid("compare", "milliampere@1", "milliampere@2", "--on", log, *out)
     assert run.code == 0, run.err
     assert counted(run.out)
     exported = result(ferryid("export", log, "--mcap", place / "forces.mcap", *VESSEL, *out, "--json", "-"))

@@ -72,7 +72,7 @@ def fitted(tmp_path_factory: pytest.TempPathFactory) -> FitOutcome:
 
 @pytest.mark.slow
 def test_predictions_are_judged_in_windows_as_a_fit_judges_them(fitted: FitOutcome, tmp_path: Path) -> None:
-    told = evaluate(fitted.model, [str(LOG), str(LOG.with_suffix(".bag"))], RunContext(tmp_path))
+    told = evaluate(fitted.model, [str(LOG), str(LOG.with_name("second.bag"))], RunContext(tmp_path))
     for entry in (*told["logs"], told["pooled"]):
         prediction = entry["prediction"]
         assert prediction["window_s"] == pytest.approx(8.0)
