@@ -120,6 +120,8 @@ def law_of_one_log(finding: Finding, context: Context, _threshold: float) -> Out
     holding = others.holding
     shown = f", and {holding or 'none'} {'does' if holding < 2 else 'do'}" if others.able else ""
     sentence = f"Of {counted(others.count, 'other log')} {others.able or 'none'} could show it at this size"
+    if not others.count:
+        sentence = "No other log could show it"
     return lowered(replace(finding, says=f"{finding.says} {sentence}{shown}.")), ""
 
 

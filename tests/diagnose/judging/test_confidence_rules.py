@@ -88,6 +88,7 @@ def test_a_law_that_one_log_of_a_campaign_shows_is_a_hint() -> None:
     law = replace(found(UNKNOWN), parameters={})
     assert law_of_one_log(law, on("law")) == (law, "")
     for others, told in (
+        (OtherLogs(0, 0, 0), "No other log could show it."),
         (OtherLogs(2, 2, 0), "Of 2 other logs 2 could show it at this size, and none does."),
         (OtherLogs(2, 2, 1), "Of 2 other logs 2 could show it at this size, and 1 does."),
         (OtherLogs(1, 0, 0), "Of 1 other log none could show it at this size."),
