@@ -14,7 +14,6 @@ from ferryid.compare.comparison_result import (
     Ratio,
     Statement,
 )
-from ferryid.compare.comparison_statements import place_of
 from ferryid.compare.evaluation import evaluate
 from ferryid.compare.replay import Replay, replay_versions
 from ferryid.compare.tracking import MEASURES, Tracking, cumulative_integral, signal_power, tracking_error
@@ -39,7 +38,6 @@ __all__ = [
     "cumulative_integral",
     "evaluate",
     "is_of_a_hull",
-    "place_of",
     "replay_versions",
     "select_candidates",
     "signal_power",

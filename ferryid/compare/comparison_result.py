@@ -210,6 +210,11 @@ class LogErrors(CommonErrors, _Log):
     warnings: tuple[str, ...]
 
 
+def place_of(kind: str, what: str, horizon_s: float | None) -> str:
+    """Return where two models are compared, as a part of a sentence; arguments are those of `Statement`."""
+    return f"in {what}, run free for {horizon_s:g} s" if kind == "free run" else f"on {what}"
+
+
 @dataclass(frozen=True)
 class Statement(Record):
     """Which of two models is better in one respect.
@@ -250,6 +255,11 @@ class Statement(Record):
     perhaps: str | None
     evidence: bool
     sentence: str = field(metadata=json_key("says"))
+
+    @property
+    def place(self) -> str:
+        """Where the two are compared, as a part of a sentence."""
+        return place_of(self.kind, self.what, self.horizon_s)
 
 
 @dataclass(frozen=True)

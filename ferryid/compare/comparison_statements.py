@@ -8,7 +8,7 @@ from math import isfinite, sqrt
 
 import numpy as np
 
-from ferryid.compare.comparison_result import Statement
+from ferryid.compare.comparison_result import Statement, place_of
 from ferryid.compare.thresholds import COMPARE
 from ferryid.regression.resampling import PairedRatios, holm
 from ferryid.types import AXES
@@ -146,11 +146,6 @@ def _statement(
         evidence=evidence,
         sentence=says,
     )
-
-
-def place_of(kind: str, what: str, horizon_s: float | None) -> str:
-    """Return where two models are compared, as a part of a sentence."""
-    return f"in {what}, run free for {horizon_s:g} s" if kind == "free run" else f"on {what}"
 
 
 def format_probability(p: float) -> str:

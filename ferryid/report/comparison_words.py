@@ -15,7 +15,6 @@ from ferryid.compare import (
     LogErrors,
     Statement,
     is_of_a_hull,
-    place_of,
 )
 from ferryid.counts import counted
 from ferryid.effects import effects
@@ -95,11 +94,10 @@ def _by_quantity(rows: Sequence[Statement]) -> list[str]:
         if isfinite(row.ratio):
             groups.setdefault((row.kind, row.what), []).append(row)
     told = []
-    for (kind, what), same in groups.items():
-        place = place_of(kind, what, same[0].horizon_s)
+    for same in groups.values():
         others = [f"{row.second} {number(row.ratio)}{_span(row.low, row.high)}" for row in same]
         says = "no difference is shown" if isfinite(same[0].low) else "there is too little data to decide"
-        told.append(f"{place}, {same[0].first} errs least, but {says}: its error over that of {listed(others)}")
+        told.append(f"{same[0].place}, {same[0].first} errs least, but {says}: its error over that of {listed(others)}")
     return told
 
 
