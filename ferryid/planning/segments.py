@@ -20,6 +20,16 @@ SHARES = (0.35, 0.65, 1.0)
 """Of the largest speeds, at which manoeuvres are drawn."""
 PAUSE_S = 4.0
 """At rest after each manoeuvre of a vessel of 5 m."""
+MULTISINE_S = 120.0
+"""Length of a multisine of a vessel of 5 m."""
+RISE_S = 40.0
+"""In which it grows and fades."""
+PERIODS_S = ((24.0, 31.0, 19.0), (40.0, 52.0, 29.0), (60.0, 37.0, 45.0), (80.0, 60.0, 33.0))
+"""Periods north, east and about the mast of a vessel of 5 m: no two alike, so that no two motions are."""
+PEAK = 0.8
+"""Of the largest acceleration, which a multisine has where it is slow."""
+MOST_TURNED = 2.5
+"""Heading to either side [rad] that a multisine reaches at most."""
 HOLD_S = 15.0
 """On each heading of a vessel of 5 m that is held."""
 
@@ -53,7 +63,9 @@ def segments(limits: Limits, time: float) -> list[Segment]:
     """
     draw = _Draw(limits, time)
     return [
-        one for make in (draw.runs, draw.circles, draw.turns, draw.swings, draw.weaves, draw.headings) for one in make()
+        one
+        for make in (draw.runs, draw.circles, draw.turns, draw.swings, draw.weaves, draw.multisines, draw.headings)
+        for one in make()
     ]
 
 
@@ -164,6 +176,49 @@ class _Draw:
         held = np.zeros(max(1, round(HOLD_S * self.time / self.step)))
         heading = np.concatenate([part for k in range(8) for part in (0.25 * pi * k + held, 0.25 * pi * k + quarter)])
         yield self._made("headings", "station keeping on eight headings", self._only(2, heading))
+
+    def multisines(self) -> Iterator[Segment]:
+        """Move along both axes and turn at once, each with a period of its own (multisine inputs, Morelli 2012)."""
+        t = np.arange(0.0, MULTISINE_S * self.time + self.step, self.step)
+        rise = np.clip(np.minimum(t, t[-1] - t) / (RISE_S * self.time), 0.0, 1.0)
+        smooth = rise**2 * (3.0 - 2.0 * rise)
+        drawn = set[str]()
+        for share in SHARES:
+            for periods in PERIODS_S:
+                north, east, turn = (smooth * np.sin(2.0 * pi * t / (period * self.time)) for period in periods)
+                rate, angular = (np.abs(one).max() for one in self._rates(turn))
+                heading = turn * min(
+                    share * self.limits.speed[2] / rate, PEAK * self.limits.acceleration[2] / angular, MOST_TURNED
+                )
+                way = np.column_stack([self.limits.long * north, self.limits.wide * east])
+                way *= min(1.0, *self._room(way, heading, share))
+                poses = np.column_stack([way, heading])
+                speed = float(np.hypot(*self._rates(way)[0].T).max())
+                told = ", ".join(f"{period * self.time:.0f}" for period in periods[:2])
+                says = (
+                    f"a multisine of up to {speed:.2g} m/s and {np.degrees(np.abs(heading).max()):.0f} deg, with periods "
+                    f"of {told} and {periods[2] * self.time:.0f} s"
+                )
+                # Where the acceleration sets the limit, a larger share of the speed changes nothing.
+                if says not in drawn:
+                    drawn.add(says)
+                    yield self._made("multisine", says, poses)
+
+    def _rates(self, values: Floats) -> tuple[Floats, Floats]:
+        """Return rates of change from step to step, one less, and how they change, two less, of values one every step."""
+        first = np.diff(values, axis=0) / self.step
+        return first, np.diff(first, axis=0) / self.step
+
+    def _room(self, way: Floats, heading: Floats, share: float) -> Iterator[float]:
+        """Yield by which factor a way [m], shape (n, 2), may be larger for each limit of speed and acceleration."""
+        ahead = np.column_stack([np.cos(heading), np.sin(heading)])
+        across = np.column_stack([-np.sin(heading), np.cos(heading)])
+        for axis, direction in enumerate((ahead, across)):
+            speed, acceleration = (
+                np.abs(np.sum(one * direction[: len(one)], axis=1)).max() for one in self._rates(way)
+            )
+            yield share * self.limits.speed[axis] / speed
+            yield PEAK * self.limits.acceleration[axis] / acceleration
 
     def _only(self, axis: int, values: Floats) -> Floats:
         poses = np.zeros((len(values), 3))

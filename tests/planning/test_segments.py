@@ -11,7 +11,7 @@ import pytest
 from ferryid.errors import FerryIdError
 from ferryid.identifiability.trial import sailing
 from ferryid.planning.limits import USED, Limits, limits_of
-from ferryid.planning.segments import STEP_S, segments
+from ferryid.planning.segments import PEAK, STEP_S, segments
 from ferryid.simulate.plant.thrust import curves_of, largest_force
 from ferryid.vessel import load_profile
 
@@ -40,6 +40,30 @@ def test_every_axis_is_moved_by_itself_and_with_the_others() -> None:
     moved = {tuple((np.ptp(one.poses, axis=0) > 1e-6).tolist()) for one in found}
     assert {(True, False, False), (False, True, False), (False, False, True), (True, True, True)} <= moved
     assert len({one.says for one in found}) == len(found)
+
+
+def test_a_multisine_moves_every_axis_at_once_up_to_a_limit_of_the_body_axes() -> None:
+    found = [one for one in segments(LIMITS, 1.0) if one.kind == "multisine"]
+    assert len(found) >= 4
+    for one in found:
+        north, east, heading = one.poses.T
+        velocity = np.diff(north + 1j * east) / STEP_S * np.exp(-1j * heading[:-1])
+        acceleration = np.diff(north + 1j * east, 2) / STEP_S**2 * np.exp(-1j * heading[:-2])
+        used = np.array(
+            [
+                np.abs(part).max() / limit
+                for several, limits in ((velocity, LIMITS.speed), (acceleration, LIMITS.acceleration))
+                for part, limit in zip((several.real, several.imag), limits, strict=False)
+            ]
+        )
+        assert used[:2].max() <= 1.001, one.says
+        assert used[2:].max() <= PEAK * 1.1, one.says
+        # No two axes move alike: what acts by their products can be told apart.
+        rates = np.corrcoef(np.vstack([velocity.real, velocity.imag, np.diff(heading)]))
+        assert np.abs(rates[np.triu_indices(3, 1)]).max() < 0.6, one.says
+    assert any(
+        np.abs(np.diff(one.poses[:, 2])).max() / STEP_S == pytest.approx(LIMITS.speed[2], rel=0.01) for one in found
+    )
 
 
 def test_speeds_are_those_at_which_damping_takes_the_force() -> None:
