@@ -209,6 +209,11 @@ class Plan:
         """Median over the coefficients of the planned trial's standard deviation over the usual one's."""
         return float(np.median([one.planned / one.usual for one in self.hull]))
 
+    @property
+    def mean_ratio(self) -> float:
+        """Geometric mean of the same, which the choice of manoeuvres brings down."""
+        return float(np.exp(np.mean([np.log(one.planned / one.usual) for one in self.hull])))
+
 
 def check_request(profile: Profile, settings: PlanSettings) -> Profile:
     """Return the vessel with the hull that is planned with, before anything is read or simulated.

@@ -36,6 +36,7 @@ def as_json(plan: Plan) -> dict[str, Any]:
         "generic_hull": plan.generic_hull,
         "usual": plan.usual,
         "ratio": plan.ratio if isfinite(plan.ratio) else None,
+        "mean_ratio": plan.mean_ratio if isfinite(plan.mean_ratio) else None,
         "coefficients": [
             {
                 "coefficient": one.name,
@@ -92,15 +93,19 @@ def as_text(plan: Plan) -> str:
 
 def summary(plan: Plan) -> str:
     """Return what the plan is expected to gain, in a sentence."""
-    worse = "" if plan.ratio < 1.0 else " The usual trial shows more in this time: record that, or give more --minutes."
+    worse = (
+        ""
+        if plan.mean_ratio < 1.0
+        else " The usual trial shows more in this time: record that, or give more --minutes."
+    )
     generic = (
         " The profile has no hull model: a generic one of its dimensions was simulated." if plan.generic_hull else ""
     )
     already = f", beside {counted(len(plan.after), 'log')} recorded already" if plan.after else ""
     return (
-        f"Expected standard deviations of the hull's coefficients: {plan.ratio:.2f} of those after {plan.usual}, "
-        f"in the median of {len(plan.hull)}{already}. They are for the noise of the simulator's sensors: "
-        f"they compare trials, and a recording will show larger ones.{worse}{generic}"
+        f"Expected standard deviations of the hull's coefficients: {plan.mean_ratio:.2f} of those after {plan.usual} in "
+        f"the geometric mean of {len(plan.hull)}, {plan.ratio:.2f} in the median{already}. They are for the noise of the "
+        f"simulator's sensors: they compare trials, and a recording will show larger ones.{worse}{generic}"
     )
 
 
