@@ -41,10 +41,11 @@ def steady_wind_force(
     nu
         Velocities over ground, shape (n, 3).
     """
-    return weighed_loads(winds_ne, weights, cosine, sine, nu, _shape(areas))
+    return weighed_loads(winds_ne, weights, cosine, sine, nu, shape_of(areas))
 
 
-def _shape(areas: WindAreas) -> Shape:
+def shape_of(areas: WindAreas) -> Shape:
+    """Return what the load of these areas is made of, with the usual density of air."""
     cd_l = areas.CD_l_AF * areas.frontal_m2 / areas.lateral_m2
     return (
         0.5 * AIR_DENSITY * areas.CD_l_AF * areas.frontal_m2,

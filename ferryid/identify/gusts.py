@@ -7,15 +7,18 @@ cost grows with the length of the log (Rue and Held 2005, chapter 2).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ferryid.compiled import compiled
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.types import Floats, Ints
 
 _PROBES = 8
 """Random vectors by which the trace of an inverse is estimated (Hutchinson 1990)."""
+MANY_WINDOWS = 5000
+"""Windows of all logs from which on solving by a compiled loop, ten times as fast, saves more than loading it takes."""
 
 
 def _probes(J: int) -> tuple[Floats, Floats]:
@@ -36,11 +39,20 @@ class GustEquations:
         Derivative of the target with respect to the wind, shape (J, 3, 2).
     blow
         Whether the log is long enough to tell gusts from the hull's forces, and has a wind at all.
+    many
+        Whether there are so many windows that loading the compiled loop pays.
+    trace
+        Expected square of what remains uncertain of the gusts, in the measure of the process.
+    uncertain
+        Sum of squares that they leave uncertain in the targets, shape (3,).
     """
 
     bands: Floats
     slope: Floats
     blow: bool
+    many: bool = False
+    trace: float = 0.0
+    uncertain: Floats = field(default_factory=lambda: np.zeros(3))
 
     def eliminated(self, columns: Sequence[tuple[Ints, Floats]], size: int, weight: Floats) -> tuple[Floats, Floats]:
         """Return the gusts' side of the normal equations and its solution, shape (2 J, size) each.
@@ -56,6 +68,9 @@ class GustEquations:
         """
         cube = np.zeros((len(self.slope), 2, size))
         for axis, (places, table) in enumerate(columns):
+            if self.many:
+                _weigh(cube, places, weight[axis] * self.slope[:, axis], table)
+                continue
             cube[:, :, places] += weight[axis] * self.slope[:, axis, :, None] * table[:, None, :]
         response = cube.reshape(-1, size)
         if not self.blow:
@@ -64,6 +79,8 @@ class GustEquations:
 
     def solve(self, right: Floats) -> Floats:
         """Return the solution for right-hand sides, shape (2 J, c)."""
+        if self.many:
+            return _solved(self.bands, right)
         from scipy.linalg import solveh_banded
 
         return np.asarray(solveh_banded(self.bands, right, check_finite=False))
@@ -72,7 +89,8 @@ class GustEquations:
 class Gusts:
     """Gusts of L logs, found window by window.
 
-    `uncertain` is the sum of squares that they leave uncertain in the targets since the last `update`, shape (3,).
+    `uncertain` is the sum of squares that they leave uncertain in the targets since the last `update`, shape (3,), and `many`
+    tells whether there are so many windows that loading compiled loops pays.
 
     Parameters
     ----------
@@ -90,6 +108,7 @@ class Gusts:
         self._sums = list[tuple[float, int]]()
         self.uncertain = np.zeros(3)
         self._probes = [_probes(len(run)) for run in runs]
+        self.many = sum(map(len, runs)) >= MANY_WINDOWS
 
     def precision(self, k: int) -> tuple[Floats, Floats]:
         """Return diagonal (J,) and neighbours (J - 1,) of the precision of a process of unit variance in one log."""
@@ -100,8 +119,11 @@ class Gusts:
         diagonal[1:] += np.where(follows, share - 1.0, 0.0)
         return diagonal, np.where(follows, -kept * share, 0.0)
 
-    def equations(self, k: int, slope: Floats, weight: Floats) -> GustEquations:
-        """Return the precision of one log's gusts for this slope of the target (J, 3, 2) and weights of the axes (3,)."""
+    def equations(self, k: int, slope: Floats, weight: Floats, *, uncertain: bool = True) -> GustEquations:
+        """Return the precision of one log's gusts for this slope of the target (J, 3, 2) and weights of the axes (3,).
+
+        What remains uncertain of them is found where that is wanted: it takes as long as all else.
+        """
         J = len(slope)
         bands = np.zeros((3, 2 * J))
         if J:
@@ -110,20 +132,27 @@ class Gusts:
             bands[2] = (np.einsum("jxx->jx", data) + diagonal[:, None]).reshape(-1)
             bands[1, 1::2] = data[:, 0, 1]
             bands[0, 2:] = np.repeat(beside, 2)
-        equations = GustEquations(bands, slope, IDENTIFY.fewest_gust_windows <= J and bool(slope.any()))
-        if equations.blow:
-            self._uncertain(k, equations)
-        return equations
+        equations = GustEquations(bands, slope, IDENTIFY.fewest_gust_windows <= J and bool(slope.any()), self.many)
+        return self._with_uncertainty(k, equations) if equations.blow and uncertain else equations
 
-    def _uncertain(self, k: int, equations: GustEquations) -> None:
-        """Add up the expected squares of what remains uncertain, in the measure of the process and in the targets."""
+    def _with_uncertainty(self, k: int, equations: GustEquations) -> GustEquations:
+        """Return equations with the expected squares of what remains uncertain."""
         size = equations.bands.shape[1]
         process, signs = self._probes[k]
         targets = (equations.slope.transpose(0, 2, 1)[..., None] * signs[:, None, None, :]).reshape(size, 3, _PROBES)
         # One factorisation for all of them.
         found = equations.solve(np.column_stack([process, targets.reshape(size, -1)]))
-        self._sums.append((float(np.sum(self._weighted(k, process) * found[:, :_PROBES])) / _PROBES, size))
-        self.uncertain += np.sum(targets * found[:, _PROBES:].reshape(targets.shape), axis=(0, 2)) / _PROBES
+        return replace(
+            equations,
+            trace=float(np.sum(self._weighted(k, process) * found[:, :_PROBES])) / _PROBES,
+            uncertain=np.sum(targets * found[:, _PROBES:].reshape(targets.shape), axis=(0, 2)) / _PROBES,
+        )
+
+    def add(self, equations: GustEquations) -> None:
+        """Add up what the gusts of one log leave uncertain, until the next `update`."""
+        if equations.blow:
+            self._sums.append((equations.trace, equations.bands.shape[1]))
+            self.uncertain += equations.uncertain
 
     def _weighted(self, k: int, values: Floats) -> Floats:
         """Return the process's precision times values, shape (2 J, c)."""
@@ -151,3 +180,56 @@ class Gusts:
         count = sum(size for _, size in self._sums)
         self.spread = float(max(np.sqrt(squares / count), IDENTIFY.least_gust_mps))
         self._sums.clear()
+
+
+@compiled
+def _weigh(cube: Floats, places: Ints, slope: Floats, table: Floats) -> None:
+    """Add the products of slopes (J, 2) and columns (J, c) to some of the columns of a cube (J, 2, size)."""
+    for j in range(table.shape[0]):
+        for x in range(2):
+            for m in range(table.shape[1]):
+                cube[j, x, places[m]] += slope[j, x] * table[j, m]
+
+
+@compiled
+def _solved(bands: Floats, right: Floats) -> Floats:
+    """Solve a precision of 2 x 2 blocks that are joined to their neighbours by multiples of the identity.
+
+    LAPACK solves for each right-hand side by itself; here every block is eliminated once for all of them.
+
+    Parameters
+    ----------
+    bands
+        See `GustEquations`, shape (3, 2 J).
+    right
+        Right-hand sides, shape (2 J, c).
+    """
+    J, columns = right.shape[0] // 2, right.shape[1]
+    out = right.copy()
+    inverse = np.empty((J, 3))
+    for j in range(J):
+        a, b, d = bands[2, 2 * j], bands[1, 2 * j + 1], bands[2, 2 * j + 1]
+        if j:
+            beside = bands[0, 2 * j]
+            a -= beside * beside * inverse[j - 1, 0]
+            b -= beside * beside * inverse[j - 1, 1]
+            d -= beside * beside * inverse[j - 1, 2]
+            for m in range(columns):
+                out[2 * j, m] -= beside * out[2 * j - 2, m]
+                out[2 * j + 1, m] -= beside * out[2 * j - 1, m]
+        determinant = a * d - b * b
+        a, b, d = d / determinant, -b / determinant, a / determinant
+        inverse[j, 0], inverse[j, 1], inverse[j, 2] = a, b, d
+        for m in range(columns):
+            first, second = out[2 * j, m], out[2 * j + 1, m]
+            out[2 * j, m] = a * first + b * second
+            out[2 * j + 1, m] = b * first + d * second
+    for j in range(J - 2, -1, -1):
+        beside = bands[0, 2 * j + 2]
+        if beside != 0.0:
+            a, b, d = inverse[j, 0] * beside, inverse[j, 1] * beside, inverse[j, 2] * beside
+            for m in range(columns):
+                first, second = out[2 * j + 2, m], out[2 * j + 3, m]
+                out[2 * j, m] -= a * first + b * second
+                out[2 * j + 1, m] -= b * first + d * second
+    return out

@@ -14,12 +14,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ferryid.identify.gusts import GustEquations, Gusts
+from ferryid.effects.wind_loads import shape_of
+from ferryid.identify.gusts import MANY_WINDOWS, GustEquations, Gusts
 from ferryid.identify.outcome import LogWind
+from ferryid.identify.some_logs import some_logs
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.weak_rows import WeakRows
+from ferryid.identify.wind_samples import mean_loads
 from ferryid.models.forces import ACCELERATIONS
 from ferryid.regression import STRIDES, window_rows, window_weights
+from ferryid.side_by_side import over
 from ferryid.signals.track import Motion
 from ferryid.types import Flags, Floats, Ints
 from ferryid.vessel.profile import Profile, WindAreas
@@ -142,21 +146,29 @@ def sample_weights(length_s: float, rate_hz: float) -> tuple[Ints, Floats]:
     return offsets, weight / weight.sum()
 
 
-class _Load:
+class Load:
     """Wind load of one log, averaged over its windows, as a function of the wind."""
 
-    def __init__(self, areas: WindAreas, samples: LoadSamples, zeta: float) -> None:
-        self.areas, self.weight, self.zeta = areas, samples.weight, zeta
+    def __init__(self, areas: WindAreas, samples: LoadSamples, zeta: float, *, many: bool = False) -> None:
+        self.areas, self.weight, self.zeta, self.many = areas, samples.weight, zeta, many
         self.cos, self.sin = np.cos(samples.psi), np.sin(samples.psi)
-        self.surge, self.sway = samples.nu[..., 0], samples.nu[..., 1]
+        self.surge, self.sway = (np.ascontiguousarray(samples.nu[..., axis]) for axis in (0, 1))
         self.still = self._mean(np.zeros(2))
 
     def _mean(self, wind: Floats, every: int = 1) -> Floats:
+        if self.many:
+            return self._means([wind], every)[0]
         north, east = (np.broadcast_to(part, (len(self.cos),))[::every, None] for part in np.asarray(wind).T)
         cos, sin = self.cos[::every], self.sin[::every]
         along, across = cos * north + sin * east, cos * east - sin * north
         load = relative_wind_force(self.areas, self.surge[::every] - along, self.sway[::every] - across)
         return np.asarray(np.einsum("jsa,s->ja", load, self.weight)) / self.zeta
+
+    def _means(self, winds: Sequence[Floats], every: int = 1) -> Floats:
+        """Return the loads of several winds, (2,) or (J, 2) each, by the compiled loop, shape (winds, J, 3)."""
+        rows = (each[::every] for each in (self.cos, self.sin, self.surge, self.sway))
+        each = np.array([np.broadcast_to(wind, (len(self.cos), 2))[::every] for wind in winds])
+        return mean_loads(each, *map(np.ascontiguousarray, rows), self.weight, shape_of(self.areas)) / self.zeta
 
     def of(self, wind: Floats, every: int = 1) -> Floats:
         """Return the load beyond that of still air, shape (J, 3), or of one in so many windows.
@@ -168,6 +180,9 @@ class _Load:
     def slope(self, wind: Floats) -> Floats:
         """Return its derivative with respect to the wind, shape (J, 3, 2)."""
         steps = _STEP_MPS * np.eye(2)
+        if self.many:
+            ahead, back = self._means([wind + s for s in steps]), self._means([wind - s for s in steps])
+            return np.ascontiguousarray(((ahead - back) / (2.0 * _STEP_MPS)).transpose(1, 2, 0))
         return np.stack([(self._mean(wind + s) - self._mean(wind - s)) / (2.0 * _STEP_MPS) for s in steps], axis=2)
 
 
@@ -207,8 +222,9 @@ def estimate_conditions(
     areas = profile.wind
     if areas is None:
         return nothing
+    many = sum(map(len, windows)) >= MANY_WINDOWS
     loads = {
-        k: _Load(areas, points, zeta)
+        k: Load(areas, points, zeta, many=many)
         for k, (one, points) in enumerate(zip(windows, samples, strict=True))
         if points is not None and len(one) >= IDENTIFY.fewest_condition_windows
     }
@@ -244,6 +260,7 @@ class _Equations:
     across: Floats
     columns: tuple[tuple[Ints, Floats], ...]
     gusts: Floats
+    process: GustEquations
 
     @classmethod
     def of(
@@ -274,6 +291,7 @@ class _Equations:
             across=whole[P:-1, :P],
             columns=columns,
             gusts=found,
+            process=gusts,
         )
 
     def gusts_at(self, hull: Floats, conditions: Floats) -> Floats:
@@ -298,6 +316,7 @@ class _Problem:
         posed: Flags,
         stride_s: float,
     ) -> None:
+        self._of = terms, mask, spread, posed, stride_s
         self.windows, self.terms, self.mask, self.spread, self.posed = windows, terms, mask, spread, posed
         self.own = [np.flatnonzero(column) for column in mask.T]
         self.low = np.cumsum([0, *(len(one) + 1 for one in self.own)])
@@ -305,6 +324,8 @@ class _Problem:
         self.steady = [np.column_stack([np.ones(len(one)), one.heading]) for one in windows]
         self.wind_spread, self.force_spread = IDENTIFY.wind_spread_mps, 0.1
         self.gusts = Gusts([one.run for one in windows], stride_s)
+        # What few windows need is over before a thread has begun.
+        self.threads = None if self.gusts.many else 1
         self.inverse: Floats = np.zeros((self.P, self.P))
         self.bare: Floats = np.zeros((self.P, self.P))
         self.factor, self.noise, self.offset_spread = 1.0, 1.0, 0.1
@@ -313,6 +334,8 @@ class _Problem:
         self.slopes = [np.zeros((len(one), 3, 2)) for one in windows]
         self.gains = np.zeros((len(terms), 3))
         self.intercept = np.zeros(3)
+        self.settled = False
+        """Whether spreads and noise stay as they are."""
 
     def _table(self, k: int, load: Floats) -> tuple[Floats, Floats]:
         """Return functions and target of a log under a wind load."""
@@ -326,22 +349,39 @@ class _Problem:
                 G[:, column] -= self.gains[self.terms.index(name)]
         return G
 
-    def solve(self, loads: Mapping[int, _Load]) -> tuple[Floats, Floats]:
+    def solve(self, loads: Mapping[int, Load]) -> tuple[Floats, Floats]:
         L = len(self.windows)
         wind, covariance = np.zeros((L, 2)), np.zeros((L, 2, 2))
-        self._step({}, wind)
+        places = some_logs([len(one) for one in self.windows])
+        if len(places) == L:
+            self._step({}, wind)
+        else:
+            self._begin_as(places, loads)
         for k, load in loads.items():
             wind[k] = self._start(k, load)
         for _ in range(IDENTIFY.condition_steps):
-            before = wind.copy()
+            before, hull = wind.copy(), self._hull()
             covariance = self._step(loads, wind)
-            if np.abs(wind - before).max() < 1e-3:
+            moved = np.abs(self._hull() - hull) / np.sqrt(np.maximum(np.diag(self.inverse), 1e-300))
+            if np.abs(wind - before).max() < 1e-3 or (self.settled and moved.max() < IDENTIFY.settled_step):
                 break
         missing = [k for k in range(L) if k not in loads]
         wind[missing], covariance[missing] = np.nan, np.nan
         return wind, covariance
 
-    def _start(self, k: int, load: _Load) -> Floats:
+    def _begin_as(self, places: Sequence[int], loads: Mapping[int, Load]) -> None:
+        """Begin with the hull of some of the logs, and keep the spreads and the noise that were found with it.
+
+        They take most of the steps, and some logs tell them as well as all.
+        """
+        self.settled = True
+        some = _Problem([self.windows[k] for k in places], *self._of)
+        some.solve({number: loads[k] for number, k in enumerate(places) if k in loads})
+        for name in ("gains", "intercept", "sigma", "noise", "factor", "offset_spread", "wind_spread", "force_spread"):
+            setattr(self, name, getattr(some, name))
+        self.gusts.spread = some.gusts.spread
+
+    def _start(self, k: int, load: Load) -> Floats:
         """Return the likeliest wind of a log for the hull found so far, of some directions and speeds."""
         X, Y = self._table(k, np.zeros((len(self.windows[k]), 3)))
         every = -(-len(Y) // _START_WINDOWS)
@@ -358,12 +398,15 @@ class _Problem:
                     best, least = wind, cost
         return best
 
-    def _step(self, loads: Mapping[int, _Load], wind: Floats) -> Floats:
+    def _step(self, loads: Mapping[int, Load], wind: Floats) -> Floats:
         """Take a Gauss-Newton step for hull and conditions, update the spreads, and return the winds' covariances.
 
         Logs without a load have steady forces only.
         """
-        logs = [self._equations(k, loads.get(k), wind[k]) for k in range(len(self.windows))]
+        logs = over(lambda k: self._equations(k, loads.get(k), wind[k]), range(len(self.windows)), most=self.threads)
+        if not self.settled:
+            for log in logs:
+                self.gusts.add(log.process)
         normal, right = np.diag(self._prior()), np.zeros(self.P)
         bare = normal + sum(log.bare for log in logs)
         for log in logs:
@@ -391,14 +434,16 @@ class _Problem:
                 winds.append(float(np.sum(squares[:2])))
             if len(left[-1]):
                 forces.append(float(np.mean(squares[2:])))
-        self._take(hull, np.diag(inverse))
+        self._take(hull)
         self.inverse, self.bare = np.asarray(inverse), np.asarray(bare)
-        self._spreads(winds, forces)
-        self._noise(left)
-        self.gusts.update()
+        if not self.settled:
+            self._hull_spreads(hull, np.diag(inverse))
+            self._spreads(winds, forces)
+            self._noise(left)
+            self.gusts.update()
         return covariance
 
-    def _equations(self, k: int, load: _Load | None, wind: Floats) -> _Equations:
+    def _equations(self, k: int, load: Load | None, wind: Floats) -> _Equations:
         """Return the normal equations of one log, linearised about a wind."""
         J, G = len(self.windows[k]), self._G()
         blown = wind + self.gusts.found[k]
@@ -420,7 +465,8 @@ class _Problem:
             columns.append((np.array(places), np.column_stack([hull, np.ones(J), slope[:, axis], forces, Y[:, axis]])))
         weight = 1.0 / (self.noise * self.sigma**2)
         prior = np.repeat([self.wind_spread, self.force_spread], [2, 9]) ** -2.0
-        return _Equations.of(tuple(columns), self.P, weight, prior, self.gusts.equations(k, slope, weight))
+        gusts = self.gusts.equations(k, slope, weight, uncertain=not self.settled)
+        return _Equations.of(tuple(columns), self.P, weight, prior, gusts)
 
     def added(self) -> Floats:
         """Return what the conditions add to the covariance of gains and intercepts, shape (3, K + 1, K + 1)."""
@@ -461,12 +507,20 @@ class _Problem:
             values[self.low[axis + 1] - 1] = (self.offset_spread * self.sigma[axis]) ** -2.0
         return values
 
-    def _take(self, hull: Floats, variance: Floats) -> None:
+    def _take(self, hull: Floats) -> None:
+        for axis, own in enumerate(self.own):
+            self.gains[own, axis] = hull[self.low[axis] : self.low[axis + 1] - 1]
+            self.intercept[axis] = hull[self.low[axis + 1] - 1]
+
+    def _hull(self) -> Floats:
+        """Return gains and intercepts of the axes, one behind the other, shape (P,)."""
+        return np.concatenate([[*self.gains[own, axis], self.intercept[axis]] for axis, own in enumerate(self.own)])
+
+    def _hull_spreads(self, hull: Floats, variance: Floats) -> None:
+        """Update how much wider than stated the prior of the gains is, and the spread of the intercepts."""
         sizes = []
         for axis, own in enumerate(self.own):
             part = slice(self.low[axis], self.low[axis + 1] - 1)
-            self.gains[own, axis] = hull[part]
-            self.intercept[axis] = hull[self.low[axis + 1] - 1]
             some = np.isfinite(self.spread[own, axis])
             sizes.append(((hull[part] ** 2 + variance[part]) / self.spread[own, axis] ** 2)[some])
         offsets = np.array([hull[high - 1] ** 2 + variance[high - 1] for high in self.low[1:]])

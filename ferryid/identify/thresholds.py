@@ -182,6 +182,21 @@ class IdentifyThresholds:
     condition_steps: int = threshold(
         25, "steps", "of the joint estimate of hull and conditions of logs", "derived: it no longer changes"
     )
+    sample_logs: int = threshold(
+        36,
+        "logs",
+        "fewest, evenly spaced, that stand for all of an archive where its window length is chosen and an estimate starts",
+        "convention: enough for spreads between logs",
+    )
+    sample_windows: int = threshold(
+        20_000, "windows", "fewest of these logs", "derived: fits of this many choose as those of all do, in a second"
+    )
+    settled_step: float = threshold(
+        0.02,
+        "standard errors",
+        "by which the hull still moves when the estimate over many logs ends",
+        "convention: nothing beside what is not known",
+    )
     fewest_condition_windows: int = threshold(
         6, "windows", "of a log from which its wind is estimated", "convention: more than it has unknowns an axis"
     )

@@ -16,14 +16,19 @@ from ferryid.identify.log_windows import LogWindows, WindowPart
 from ferryid.identify.outcome import FitOutcome
 from ferryid.identify.pipeline import accept_estimate
 from ferryid.identify.settings import FitSettings, check_components
+from ferryid.identify.some_logs import some_logs
 from ferryid.identify.split import validation_blocks
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.window_length import TRAINING_LENGTHS, best_length
 from ferryid.identify.window_store import load_windows
 from ferryid.identify.windowed_data import WindowedData
 from ferryid.regression.bases import Basis, make_basis
+from ferryid.side_by_side import over
 from ferryid.types import RunContext
 from ferryid.vessel.profile import Profile
+
+_AT_A_TIME = 16
+"""Logs that are read before progress is told again."""
 
 
 def fit_weak_archive(
@@ -48,24 +53,36 @@ def fit_weak_archive(
             "Fix: ingest more or longer logs, or give --estimator derivative"
         )
     if settings.weak_window_s is None:
-        data = best_length({1.0: data, **_longer(data, where, run)})
+        data = _with_best_length(data, where, run)
     run.progress("fitting")
     data.refuse_contradictions()
     estimate = estimate_correction(data, data.components(), settings.draws, run.progress)
     return accept_estimate(data, estimate, name, run)
 
 
-def _longer(data: WindowedData, where: Sequence[Path], run: RunContext) -> dict[float, WindowedData]:
-    """Return the data with longer training windows, by what the usual length is multiplied with."""
-    out = {}
+def _with_best_length(data: WindowedData, where: Sequence[Path], run: RunContext) -> WindowedData:
+    """Return the data with training windows of the length that tells most, of some of the logs where there are many."""
+    places = some_logs([len(part.measured) for part in data.trained])
+    some = data.of_logs(places)
+    candidates = {1.0: some}
     for share in TRAINING_LENGTHS[1:]:
-        length_s = share * data.windows.length_s
-        settings = replace(data.settings, weak_window_s=length_s)
-        divided = data.settings.split == "blocks"
-        logs, _ = archived_windows(where, data.profile, settings, run.progress, divided=divided)
-        trained, _ = _divided(logs, data.settings.split)
-        out[share] = replace(data, trained=tuple(trained), training_s=length_s)
-    return out
+        candidates[share] = _of_length(some, [where[place] for place in places], share * data.windows.length_s, run)
+    best = best_length(candidates)
+    if best is some:
+        return data
+    return best if len(places) == len(where) else _of_length(data, where, best.windows.training_length_s, run)
+
+
+def _of_length(data: WindowedData, where: Sequence[Path], length_s: float, run: RunContext) -> WindowedData:
+    """Return the data with training windows of another length [s]."""
+    settings = replace(data.settings, weak_window_s=length_s)
+    divided = data.settings.split == "blocks"
+    logs, _ = archived_windows(where, data.profile, settings, run.progress, divided=divided)
+    trained = [
+        one if one.rows and before.rows else one.none()
+        for one, before in zip((log.parts[0] for log in logs), data.trained, strict=True)
+    ]
+    return replace(data, trained=tuple(trained), training_s=length_s)
 
 
 def archived_windows(
@@ -84,10 +101,12 @@ def archived_windows(
         For a log of another basis, by name.
     """
     logs: list[LogWindows] = []
-    for number, folder in enumerate(where):
-        progress(f"adding log {number + 1} of {len(where)}")
-        logs.append(load_windows(folder, profile, settings, divided=divided))
-        refuse_other_basis((logs[0].name, logs[0].basis), (logs[-1].name, logs[-1].basis))
+    for low in range(0, len(where), _AT_A_TIME):
+        progress(f"adding log {low + 1} of {len(where)}")
+        some = where[low : low + _AT_A_TIME]
+        logs += over(lambda folder: load_windows(folder, profile, settings, divided=divided), some)
+        for log in logs[low:]:
+            refuse_other_basis((logs[0].name, logs[0].basis), (log.name, log.basis))
     return tuple(logs), make_basis(logs[0].basis, structure=settings.structure)
 
 

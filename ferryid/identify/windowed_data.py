@@ -119,6 +119,15 @@ class WindowedData(WeakData):
             training_s=training_s,
         )
 
+    def of_logs(self, places: Sequence[int]) -> WindowedData:
+        """Return the data of the logs at some places."""
+        logs, trained, validated = ([every[k] for k in places] for every in (self.logs, self.trained, self.validated))
+        return (
+            self
+            if len(logs) == len(self.logs)
+            else replace(self, logs=tuple(logs), trained=tuple(trained), validated=tuple(validated))
+        )
+
     @property
     def where(self) -> str:
         """Name of the first log, for messages."""

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from ferryid.identify import log_conditions
 from ferryid.identify.estimation import estimate_correction
 from ferryid.identify.gusts import Gusts
-from ferryid.identify.log_conditions import Conditions
+from ferryid.identify.log_conditions import Conditions, Load, LoadSamples
 from ferryid.identify.outcome import LogWind
+from ferryid.identify.some_logs import some_logs
+from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.weak_data import WeakData
 from ferryid.models.forces import Estimator, effective_mass
 from ferryid.signals.track import Motion
@@ -192,3 +196,56 @@ def test_a_wind_is_worded_by_speed_direction_and_scatter() -> None:
     assert not none.significant
     assert str(none) == "b: none that differs from zero"
     assert none.to_json()["wind"]["north"] == {"value": 0.1, "standard_error": 0.2, "unit": "m/s"}
+
+
+def test_many_windows_are_solved_alike_by_compiled_loops() -> None:
+    rng = np.random.default_rng(2)
+    gusts = Gusts([np.repeat([0, 1, 2], [70, 1, 60])], 5.0)
+    slope, weight = rng.standard_normal((131, 3, 2)), np.array([1.0, 2.0, 0.5])
+    few = gusts.equations(0, slope, weight)
+    assert few.blow
+    assert not few.many
+    many = replace(few, many=True)
+    columns = [(np.array([axis, 3, 4]), rng.standard_normal((131, 3))) for axis in range(3)]
+    for one, other in zip(few.eliminated(columns, 5, weight), many.eliminated(columns, 5, weight), strict=True):
+        np.testing.assert_allclose(other, one, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("wind", [np.array([3.0, -1.0]), np.linspace([-2.0, 0.0], [0.5, 4.0], 40)])
+def test_loads_of_many_windows_are_the_same(wind: Floats) -> None:
+    assert PROFILE.wind is not None
+    rng = np.random.default_rng(3)
+    samples = LoadSamples(rng.uniform(-4.0, 4.0, (40, 16)), rng.standard_normal((40, 16, 3)), np.full(16, 1.0 / 16.0))
+    few, many = (Load(PROFILE.wind, samples, 0.9, many=many) for many in (False, True))
+    np.testing.assert_allclose(many.of(wind), few.of(wind), rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(many.slope(wind), few.slope(wind), rtol=1e-7, atol=1e-7)
+    if wind.ndim == 1:
+        np.testing.assert_allclose(many.of(wind, 3), few.of(wind)[::3], rtol=1e-10, atol=1e-10)
+
+
+def test_some_logs_stand_for_many_where_they_have_windows_enough() -> None:
+    assert some_logs([100] * 36) == list(range(36))
+    assert some_logs([100] * 200) == list(range(200))
+    chosen = some_logs([0, 1000, 1000, 1000] * 50)
+    assert len(chosen) == IDENTIFY.sample_logs
+    assert all(place % 4 for place in chosen)
+    assert (chosen[0], chosen[-1]) == (1, 199)
+
+
+@pytest.mark.slow
+def test_many_logs_begin_as_some_of_them_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    data = data_of([measured(seed, seconds=240.0, jitter=0.01, noise=4.0, force=blown) for seed in range(6)], sigma=0.8)
+    every = replace(data).conditions
+    steps: list[int] = []
+    step = log_conditions._Problem._step
+
+    def counted(self: log_conditions._Problem, *given: Any) -> Floats:
+        steps.append(len(self.windows))
+        return step(self, *given)
+
+    monkeypatch.setattr(log_conditions._Problem, "_step", counted)
+    monkeypatch.setattr("ferryid.identify.some_logs.IDENTIFY", replace(IDENTIFY, sample_logs=3, sample_windows=1))
+    found = replace(data).conditions
+    assert steps.count(6) < steps.count(3)
+    np.testing.assert_allclose(found.wind, every.wind, atol=0.1)
+    np.testing.assert_allclose(found.wind, np.broadcast_to(TRUE, (6, 2)), atol=0.4)

@@ -21,7 +21,9 @@ from ferryid.identify.log_windows import LogWindows, average_log
 from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.split import split_rows
+from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.weak_rows import WeakRows
+from ferryid.identify.windowed_data import WindowedData
 from ferryid.models.model import model_to_json
 from ferryid.regression.bases import make_basis
 from ferryid.signals.parquet import read_table, write_table
@@ -30,6 +32,7 @@ from ferryid.signals.smooth import smooth_measured
 from ferryid.simulate import load_scenario, simulate, write_log
 from ferryid.types import RunContext
 from ferryid.vessel import load_profile, parse_profile
+from ferryid.vessel.dimensions import window_seconds
 from tests.identify.trials import measured
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
@@ -280,3 +283,21 @@ def test_swapped_thrusters_are_refused_in_an_archive_as_well(season: Path) -> No
         open_track(note["files"][0][0], profile, season.parent / "swapped")
     with pytest.raises(FerryIdError, match=r"day1: the yaw moment accelerates .*exchanged.*Fix: "):
         fit_archive(profile, SETTINGS, RunContext(season.parent / "swapped"))
+
+
+@pytest.mark.slow
+def test_some_of_many_logs_choose_the_length_of_windows(season: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = fit_archive(PROFILE, SETTINGS, RunContext(season))
+    monkeypatch.setattr("ferryid.identify.some_logs.IDENTIFY", replace(IDENTIFY, sample_logs=2, sample_windows=1))
+    asked: list[int] = []
+
+    def chosen(candidates: dict[float, WindowedData]) -> WindowedData:
+        asked.extend(len(one.logs) for one in candidates.values())
+        return candidates[2.0]
+
+    monkeypatch.setattr(weak_archive, "best_length", chosen)
+    found = fit_archive(PROFILE, SETTINGS, RunContext(season))
+    assert asked == [2] * 4
+    assert found.model.settings["weak_window_s"] == pytest.approx(2.0 * window_seconds(PROFILE))
+    assert found.model.training == before.model.training
+    assert len(found.winds) == 3
