@@ -12,13 +12,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtri
 
 from ferryid.identify.inertia import rigid_body
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.weak_rows import to_force
 from ferryid.models.forces import ACCELERATIONS, effective_mass, motion_force, without_sway_coupling
 from ferryid.regression.bases import Basis
+from ferryid.regression.non_negative import non_negative
 from ferryid.types import AXES, Flags, Floats
 from ferryid.vessel.profile import Profile
 
@@ -159,9 +159,15 @@ def feasible_gains(
     shift = current - (wanted + lift @ (level - normal @ wanted))
     bounds = [rows[k][2] for k in active.tolist() if rows[k][2]]
     # What scatter alone may bring to a bound is no contradiction.
-    contradicted = bool(bounds) and float(shift @ problem.cost @ shift) > chdtri(len(bounds), IDENTIFY.bound_level)
+    contradicted = bool(bounds) and _beyond_scatter(float(shift @ problem.cost @ shift), len(bounds))
     told = tuple(dict.fromkeys(bounds)) if contradicted else ()
     return Feasible(problem.gains(current), told, (lift, normal, level), shift, tuple(problem.places), pull)
+
+
+def _beyond_scatter(distance: float, bounds: int) -> bool:
+    from scipy.special import chdtri  # a tenth of a second to import: only where it is needed
+
+    return bool(distance > chdtri(bounds, IDENTIFY.bound_level))
 
 
 @dataclass(frozen=True, eq=False)
@@ -366,8 +372,6 @@ def _nearest(cost: Floats, wanted: Floats, normal: Floats, level: Floats) -> tup
 
     As least distance by non-negative least squares: Lawson and Hanson (1974), Solving Least Squares Problems, chapter 23.
     """
-    from scipy.optimize import nnls
-
     unit = np.sqrt(np.maximum(np.diag(cost), 1e-300))
     scaled = cost / np.outer(unit, unit)
     root = np.linalg.cholesky(scaled + 1e-9 * np.eye(len(scaled)))
@@ -381,7 +385,7 @@ def _nearest(cost: Floats, wanted: Floats, normal: Floats, level: Floats) -> tup
     far = max(float(np.max(b)), 1e-12)
     table, target = np.vstack([A.T, b / far]), np.zeros(A.shape[1] + 1)
     target[-1] = 1.0
-    weights, _ = nnls(table, target, maxiter=50 * len(A))
+    weights = non_negative(table, target, most=50 * len(A))
     left = table @ weights - target
     if abs(left[-1]) < 1e-12:  # no gains satisfy all of it: a base model that is itself not possible
         return wanted, np.zeros(0, dtype=np.int64)

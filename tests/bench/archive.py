@@ -81,9 +81,9 @@ def run(quick: bool) -> Section:
     notes = [
         f"Kept of {logs} logs: {size / 1e6:.0f} MB of sums, 36 blocks in three pieces each. Peak memory of the process: "
         f"{peak / 1e9:.2f} GB (goal: at most 1).",
-        f"For the weak form: {windows / 1e6:.0f} MB of windows of {len(TRAINING_LENGTHS)} lengths, of which a fit holds those of "
-        f"the usual one and of the one it chooses, and of some logs the others: {weak_peak / 1e9:.2f} GB. Winds and gusts of each "
-        "log are estimated with the hull by steps over all its windows, which no sums can replace: the load of a wind is not "
+        f"For the weak form: {windows / 1e6:.0f} MB of windows of {len(TRAINING_LENGTHS)} lengths. A fit holds those of the "
+        f"usual length and of the chosen one, and of some logs the others: {weak_peak / 1e9:.2f} GB. Winds and gusts of each "
+        "log are estimated with the hull by steps over all its windows. Sums cannot replace these: the load of a wind is not "
         "linear in it.",
         "The pass over the rows forms basis and cross-products in chunks from arrays in memory, once; ingestion and smoothing, "
         "which the sums save as well, are not counted.",
