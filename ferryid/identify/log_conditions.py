@@ -157,7 +157,7 @@ class Load:
 
     def _mean(self, wind: Floats, every: int = 1) -> Floats:
         if self.many:
-            return self._means([wind], every)[0]
+            return np.asarray(self._means([wind], every)[0])
         north, east = (np.broadcast_to(part, (len(self.cos),))[::every, None] for part in np.asarray(wind).T)
         cos, sin = self.cos[::every], self.sin[::every]
         along, across = cos * north + sin * east, cos * east - sin * north
@@ -166,9 +166,11 @@ class Load:
 
     def _means(self, winds: Sequence[Floats], every: int = 1) -> Floats:
         """Return the loads of several winds, (2,) or (J, 2) each, by the compiled loop, shape (winds, J, 3)."""
-        rows = (each[::every] for each in (self.cos, self.sin, self.surge, self.sway))
+        cos, sin, surge, sway = (
+            np.ascontiguousarray(one[::every]) for one in (self.cos, self.sin, self.surge, self.sway)
+        )
         each = np.array([np.broadcast_to(wind, (len(self.cos), 2))[::every] for wind in winds])
-        return mean_loads(each, *map(np.ascontiguousarray, rows), self.weight, shape_of(self.areas)) / self.zeta
+        return mean_loads(each, cos, sin, surge, sway, self.weight, shape_of(self.areas)) / self.zeta
 
     def of(self, wind: Floats, every: int = 1) -> Floats:
         """Return the load beyond that of still air, shape (J, 3), or of one in so many windows.

@@ -121,11 +121,13 @@ class WindowedData(WeakData):
 
     def of_logs(self, places: Sequence[int]) -> WindowedData:
         """Return the data of the logs at some places."""
-        logs, trained, validated = ([every[k] for k in places] for every in (self.logs, self.trained, self.validated))
-        return (
-            self
-            if len(logs) == len(self.logs)
-            else replace(self, logs=tuple(logs), trained=tuple(trained), validated=tuple(validated))
+        if len(places) == len(self.logs):
+            return self
+        return replace(
+            self,
+            logs=tuple(self.logs[k] for k in places),
+            trained=tuple(self.trained[k] for k in places),
+            validated=tuple(self.validated[k] for k in places),
         )
 
     @property
