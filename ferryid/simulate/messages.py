@@ -12,6 +12,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from ferryid.simulate.sensors import Stream
+from ferryid.simulate.usual_messages import USUAL, usual_typestore
 
 CUSTOM = {
     "ferry_msgs/msg/ThrusterState": (
@@ -48,9 +49,25 @@ def typestore(ros_version: int) -> Typestore:
 
 
 @cache
+def _store_of(name: str, ros_version: int) -> Typestore:
+    """Return message types that one is among: the few usual ones, if they will do."""
+    if ros_version == 2 and (name in USUAL or name in CUSTOM):
+        return _few()
+    return typestore(ros_version)
+
+
+@cache
+def _few() -> Typestore:
+    store = usual_typestore()
+    for name, text in CUSTOM.items():
+        store.register(get_types_from_msg(text, name))
+    return store
+
+
+@cache
 def definition(name: str, ros_version: int) -> tuple[str, str]:
     """Return a type's definition with those of all types in it, and its hash; the ferry's own with their comments."""
-    text, digest = typestore(ros_version).generate_msgdef(name, ros_version=ros_version)
+    text, digest = _store_of(name, ros_version).generate_msgdef(name, ros_version=ros_version)
     if name in CUSTOM:
         _, line, others = text.partition("=" * 80)
         text = CUSTOM[name] + line + others
@@ -70,7 +87,7 @@ class MessageTable:
     """
 
     def __init__(self, stream: Stream, ros_version: int) -> None:
-        store, message = typestore(ros_version), _message(stream, ros_version)
+        store, message = _store_of(stream.type, ros_version), _message(stream, ros_version)
         self._template = _bytes(store, message, stream.type, ros_version)
         self.size = len(self._template)
         places = _places(store, stream.type, message, ros_version)
@@ -117,7 +134,7 @@ def sizes(stream: Stream, ros_version: int) -> NDArray[np.int64]:
 
 def _message(stream: Stream, ros_version: int) -> Any:
     """Return a message of a stream with what all of its messages share."""
-    message = _blank(typestore(ros_version), stream.type)
+    message = _blank(_store_of(stream.type, ros_version), stream.type)
     _put(message, "header.frame_id", stream.frame_id)
     for path, value in stream.constants.items():
         _put(message, path, value)
@@ -132,7 +149,7 @@ def _one_by_one(stream: Stream, message: Any, ros_version: int) -> Iterator[byte
         if ros_version == 1:
             message.header.seq = row
         message.data = np.frombuffer(blob, dtype=np.uint8)
-        yield _bytes(typestore(ros_version), message, stream.type, ros_version)
+        yield _bytes(_store_of(stream.type, ros_version), message, stream.type, ros_version)
 
 
 def _bytes(store: Typestore, message: Any, name: str, ros_version: int) -> bytes:
