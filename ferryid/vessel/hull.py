@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -111,18 +111,26 @@ def _damping_force(D: Mapping[str, float], nu_r: Floats) -> Floats:
         return np.zeros_like(nu_r)
     u, v, r = nu_r[..., 0], nu_r[..., 1], nu_r[..., 2]
     size_v, size_r = np.abs(v), np.abs(r)
-    get = _zero_default(D)
-    surge = (-get("X_u") - get("X_|u|u") * np.abs(u) - get("X_uuu") * u**2) * u
-    sway = (-get("Y_v") - get("Y_|v|v") * size_v - get("Y_|r|v") * size_r - get("Y_vvv") * v**2) * v + (
-        -get("Y_r") - get("Y_|v|r") * size_v - get("Y_|r|r") * size_r
-    ) * r
-    yaw = (-get("N_v") - get("N_|v|v") * size_v - get("N_|r|v") * size_r) * v + (
-        -get("N_r") - get("N_|v|r") * size_v - get("N_|r|r") * size_r - get("N_rrr") * r**2
-    ) * r
-    sway = sway - (get("Y_uv") * v + get("Y_ur") * r) * u
-    yaw = yaw - (get("N_uv") * v + get("N_ur") * r) * u
+
+    def less(first: str, *others: tuple[str, Floats]) -> Floats | float:
+        # Most hulls have few of the terms, and this is called in every step of a free run.
+        total: Floats | float = -D.get(first, 0.0)
+        for term, values in others:
+            if coefficient := D.get(term, 0.0):
+                total = total - coefficient * values
+        return total
+
+    surge = less("X_u", ("X_|u|u", np.abs(u)), ("X_uuu", u**2)) * u
+    sway = (
+        less("Y_v", ("Y_|v|v", size_v), ("Y_|r|v", size_r), ("Y_vvv", v**2)) * v
+        + less("Y_r", ("Y_|v|r", size_v), ("Y_|r|r", size_r)) * r
+    )
+    yaw = (
+        less("N_v", ("N_|v|v", size_v), ("N_|r|v", size_r)) * v
+        + less("N_r", ("N_|v|r", size_v), ("N_|r|r", size_r), ("N_rrr", r**2)) * r
+    )
+    lift = [D.get(term, 0.0) for term in ("Y_uv", "Y_ur", "N_uv", "N_ur")]
+    if any(lift):
+        sway = sway - (lift[0] * v + lift[1] * r) * u
+        yaw = yaw - (lift[2] * v + lift[3] * r) * u
     return np.stack([surge, sway, yaw], axis=-1)
-
-
-def _zero_default(D: Mapping[str, float]) -> Callable[[str], float]:
-    return lambda term: D.get(term, 0.0)

@@ -18,6 +18,10 @@ from tests.bench.trials import SCALE, VESSEL
 
 TABLES = ("numpy", "pyarrow", "pyarrow.parquet", "typer")
 """Packages that any program needs which has a command line and writes Parquet."""
+STATISTICS = ("scipy.linalg", "scipy.special")
+"""What a fit needs besides: banded equations, and quantiles of its intervals."""
+COMPILED = ("numpy", "numba", "scipy.linalg.cython_blas", "typer")
+"""What a simulation needs: numba loads the third with the first compiled function, whatever that calls."""
 ROUND = """
 schema = "ferryid.scenario/1"
 title = "One round of the 12-corner path"
@@ -50,9 +54,9 @@ def run(quick: bool) -> Section:
         fits = [("fit", str(trial), *VESSEL, *SCALE, "--out", str(folder / f"floor{number}")) for number in range(4)]
         simulation = ("simulate", str(scenario), *log)
         floors = [
-            floor("`fit` of 24 min", fits[0], fits[1], (*TABLES, "matplotlib.figure")),
-            floor("`fit --no-report`", (*fits[2], "--no-report"), (*fits[3], "--no-report"), TABLES),
-            floor("`simulate` of 12 min", simulation, simulation, ("numpy", "numba", "typer")),
+            floor("`fit` of 24 min", fits[0], fits[1], (*TABLES, *STATISTICS, "matplotlib.figure")),
+            floor("`fit --no-report`", (*fits[2], "--no-report"), (*fits[3], "--no-report"), (*TABLES, *STATISTICS)),
+            floor("`simulate` of 12 min", simulation, simulation, COMPILED),
             floor(f"`batch` of {logs} logs and nothing to do", resume, resume, ("numpy", "typer")),
         ]
     notes = (
