@@ -17,8 +17,8 @@ from ferryid.identify.inertia import rigid_body
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.weak_rows import to_force
 from ferryid.models.forces import ACCELERATIONS, effective_mass, motion_force, without_sway_coupling
+from ferryid.regression import non_negative
 from ferryid.regression.bases import Basis
-from ferryid.regression.non_negative import non_negative
 from ferryid.types import AXES, Flags, Floats
 from ferryid.vessel.profile import Profile
 
