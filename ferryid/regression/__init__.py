@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 from ferryid.lazy import import_on_demand
 
 if TYPE_CHECKING:
+    from ferryid.regression.active_set import non_negative
     from ferryid.regression.collinearity import singular_values, undetermined_terms
     from ferryid.regression.cross_products import CrossProducts, Rows
     from ferryid.regression.nipals import component_covariances, fit_nipals
-    from ferryid.regression.non_negative import non_negative
     from ferryid.regression.pca import principal_components
     from ferryid.regression.qr import QrFactor, factorise
     from ferryid.regression.simpls import Simpls, fit_simpls, total
@@ -57,7 +57,7 @@ __getattr__ = import_on_demand(
             "component_covariances",
             "fit_nipals",
         ),
-        "non_negative": ("non_negative",),
+        "active_set": ("non_negative",),
         "pca": ("principal_components",),
         "qr": (
             "QrFactor",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from ferryid.regression.non_negative import non_negative
+from ferryid.regression.active_set import non_negative
 
 
 @pytest.mark.parametrize("seed", range(40))
