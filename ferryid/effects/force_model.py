@@ -68,6 +68,8 @@ class Measurements:
     rudders
         Thrust of one propeller before deduction [N] and angle of the rudder behind it [rad], NaN for actuators without a
         rudder, shape (n, k, 2), or None for a vessel without one.
+    slopes
+        Which of `u, v, r` nothing measured: they are slopes of the position or heading, and have its errors.
     repeats
         Where old values were repeated and taken out before: places of the channels among the columns of `eta` and `nu_raw`,
         and times of the last right sample before and of the first one after [s].
@@ -85,6 +87,7 @@ class Measurements:
     current: Floats | None = None
     payload: Floats | None = None
     rudders: Floats | None = None
+    slopes: frozenset[str] = frozenset()
     repeats: tuple[tuple[tuple[int, ...], float, float], ...] = ()
 
     @property
@@ -96,6 +99,11 @@ class Measurements:
     def names(self) -> tuple[str, ...]:
         """Names of the actuators, in the order of `parts`."""
         return tuple(actuator.name for actuator in self.profile.actuators)
+
+    def seen_twice(self, axis: int) -> bool:
+        """Return whether a motion in surge (0), sway (1) or yaw (2) shows in two sensors: in the pose, and in a velocity."""
+        placed = bool(np.isfinite(self.eta[self.usable, :2]).all())
+        return placed and "uvr"[axis] not in self.slopes
 
     @property
     def psi(self) -> Floats:

@@ -109,6 +109,7 @@ def measurements_of_motion(track: Track, motion: Motion, profile: Profile) -> Me
         current=None if motion.current is None else interpolate_gaps(motion.current, rows),
         payload=None if motion.payload is None else interpolate_gaps(motion.payload, rows, held=True),
         rudders=rudder_states(profile, track.columns, through_water, np.ones_like(rows)),
+        slopes=track.slopes,
     )
 
 

@@ -20,7 +20,7 @@ from ferryid.signals.source import Held, Source
 from ferryid.signals.thresholds import SIGNALS
 from ferryid.signals.track import LeftOut, Track
 from ferryid.types import Flags, Floats
-from ferryid.vessel import actuator_columns, resolve, resolve_notes
+from ferryid.vessel import actuator_columns, resolve, resolve_notes, slopes_of_pose
 from ferryid.vessel.profile import Profile
 
 if TYPE_CHECKING:
@@ -98,6 +98,7 @@ def align(recording: Recording, profile: Profile, rate_hz: float | None = None, 
         if name in columns:
             columns[name][wrong] = np.nan
     repairs.extend(resolve_notes(profile, columns))
+    slopes = slopes_of_pose(columns)
     try:
         columns = resolve(profile, columns, rate)
     except FerryIdError as error:
@@ -133,7 +134,9 @@ def align(recording: Recording, profile: Profile, rate_hz: float | None = None, 
         f"{verb(one.rows, 'is')} not used: {one.reason}."
         for one in left_out
     )
-    track = Track(recording.name, t[: valid.size], t0_ns, rate, columns, valid, tuple(repairs), left_out=left_out)
+    track = Track(
+        recording.name, t[: valid.size], t0_ns, rate, columns, valid, tuple(repairs), left_out=left_out, slopes=slopes
+    )
     doubts = (*step_doubts(faults.poses, t0_ns), *cross_checks(track))
     return replace(track, repairs=(*repairs, *(doubt.says for doubt in doubts)), doubts=doubts)
 

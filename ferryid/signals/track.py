@@ -127,6 +127,8 @@ class Track:
         Contradictions between signals; their sentences stand among the repairs too.
     left_out
         Rows that are not valid, by reason; each row once.
+    slopes
+        Which of `u, v, r` nothing measured: they are slopes of the position or heading.
     """
 
     log: str
@@ -138,6 +140,7 @@ class Track:
     repairs: tuple[str, ...] = ()
     doubts: tuple[Doubt, ...] = ()
     left_out: tuple[LeftOut, ...] = ()
+    slopes: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)

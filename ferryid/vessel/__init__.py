@@ -4,7 +4,7 @@ from ferryid.vessel.choice import VesselChoice, choose_vessel, stated_choice
 from ferryid.vessel.describe import describe
 from ferryid.vessel.faults import Fault
 from ferryid.vessel.load import bundled, check_profile, known, load_profile, parse_profile
-from ferryid.vessel.resolve import SWAY_NOT_MEASURED, resolve, resolve_notes
+from ferryid.vessel.resolve import SWAY_NOT_MEASURED, resolve, resolve_notes, slopes_of_pose
 from ferryid.vessel.signal_map import Selection, convert, select, survey
 from ferryid.vessel.thrusters import actuator_columns, applied_force, speed_doubts
 
@@ -26,6 +26,7 @@ __all__ = [
     "resolve",
     "resolve_notes",
     "select",
+    "slopes_of_pose",
     "speed_doubts",
     "stated_choice",
     "survey",

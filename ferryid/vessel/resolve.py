@@ -57,12 +57,22 @@ def resolve(profile: Profile, columns: Mapping[str, Floats], rate_hz: float | No
     return out
 
 
+def slopes_of_pose(columns: Collection[str]) -> frozenset[str]:
+    """Return which of `u, v, r` are slopes of the position or heading that `resolve` takes, given these columns.
+
+    They show what the pose shows, its errors included, and are no second witness of anything.
+    """
+    turning = {"r"} if "r" not in columns and "psi" in columns else set[str]()
+    moving = {"u", "v"} if not {"u", "vel_N"} & set(columns) and "x" in columns else set[str]()
+    return frozenset(turning | moving)
+
+
 def resolve_notes(profile: Profile, columns: Collection[str]) -> tuple[str, ...]:
     """Say in sentences what `resolve` derives from other signals, or must leave out, given these columns."""
-    notes = []
-    if "r" not in columns and "psi" in columns:
+    notes, slopes = [], slopes_of_pose(columns)
+    if "r" in slopes:
         notes.append("Yaw rate is the slope of the heading: the log has no yaw rate.")
-    if "u" not in columns and "vel_N" not in columns and "x" in columns:
+    if "u" in slopes:
         notes.append("Surge and sway are the slope of the position turned by the heading: the log has no velocity.")
     elif "u" not in columns and "vel_N" in columns:
         notes.append("Surge and sway are the velocity over ground turned by the heading.")

@@ -31,6 +31,8 @@ class SensorFinding:
         That it is so.
     vessel
         True for what all logs of a campaign show together: see `ferryid.diagnose.checks.pooling`.
+    doubt
+        Why it is not credible beside other logs, as the end of a sentence; empty where it is.
     """
 
     effect: str
@@ -40,6 +42,7 @@ class SensorFinding:
     evidence: Mapping[str, Floats] = field(default_factory=dict)
     probability: float = 1.0
     vessel: bool = False
+    doubt: str = ""
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,8 @@ class Lasting:
         Returns the finding as a sentence, of values by name.
     corrected
         Returns measurements without an error of these values.
+    of_instrument
+        True where the instrument or its mounting has the error, so that it is the same in all logs; a clock may be set anew.
     """
 
     neutral: float
@@ -65,6 +70,7 @@ class Lasting:
     least: Callable[[Measurements], float]
     says: Callable[[Mapping[str, float]], str]
     corrected: Callable[[Measurements, Mapping[str, float]], Measurements]
+    of_instrument: bool = True
 
 
 @dataclass(frozen=True)

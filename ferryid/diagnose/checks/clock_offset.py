@@ -82,5 +82,5 @@ CHECK = Check(
     find,
     30,
     estimate,
-    Lasting(0.0, float(SIZE[LATE]), lambda _: CHECKS.least_delay_s, says_of, corrected),
+    Lasting(0.0, float(SIZE[LATE]), lambda _: CHECKS.least_delay_s, says_of, corrected, of_instrument=False),
 )

@@ -8,7 +8,7 @@ Trials 7) and the interval widened where the logs scatter more than that (Knapp 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import exp, isfinite, log
 
 import numpy as np
@@ -229,6 +229,8 @@ def pool_check(check: Check, later: Sequence[Check], logs: Sequence[Examined]) -
     """
     found = [one.alone.get(check.id) for one in logs]
     pooled = _pooled(check, logs, found)
+    if pooled is None:
+        found = _doubted(check, logs, found)
     for i, (one, own) in enumerate(zip(logs, found, strict=True)):
         if pooled is not None and i not in pooled[1].apart:
             one.correct(pooled[0])
@@ -241,11 +243,27 @@ def pool_check(check: Check, later: Sequence[Check], logs: Sequence[Examined]) -
             one.correct(own)
 
 
+def _doubted(
+    check: Check, logs: Sequence[Examined], found: Sequence[SensorFinding | None]
+) -> list[SensorFinding | None]:
+    """Return what logs show of an error that has no common value: of an instrument it would, so that each is doubtful."""
+    showing = _showing(logs, found)
+    if check.lasting is None or not check.lasting.of_instrument or len(showing) < CHECKS.pooled_logs:
+        return list(found)
+    doubt = f"{counted(len(showing), 'log')} show such an error, and its size differs between the logs as no instrument's does"
+    return [None if one is None else replace(one, doubt=doubt) for one in found]
+
+
+def _showing(logs: Sequence[Examined], found: Sequence[SensorFinding | None]) -> list[int]:
+    """Return the places of logs that show an error by themselves."""
+    return [i for i, (log, own) in enumerate(zip(logs, found, strict=True)) if own is not None and not log.copy]
+
+
 def _pooled(
     check: Check, logs: Sequence[Examined], found: Sequence[SensorFinding | None]
 ) -> tuple[SensorFinding, Pool] | None:
     lasting, estimate = check.lasting, check.estimate
-    showing = [i for i, (log, own) in enumerate(zip(logs, found, strict=True)) if own is not None and not log.copy]
+    showing = _showing(logs, found)
     if lasting is None or estimate is None or len(showing) < CHECKS.pooled_logs:
         return None
     estimates: list[Mapping[str, Estimate]] = [

@@ -259,4 +259,5 @@ def _measurements(track: Track, measured: Measured, profile: Profile, window_s: 
         current=None if current is None else steady_mean(current, rows),
         payload=None if measured.payload is None else interpolate_gaps(measured.payload, usable, held=True),
         rudders=rudder_states(profile, track.columns, through_water, usable),
+        slopes=track.slopes,
     )

@@ -68,8 +68,13 @@ class Fit:
 
     def errors(self, index: int) -> Floats:
         """Return the posterior's standard deviations of one candidate's parameters."""
+        return np.sqrt(np.diag(self.covariance(index)))
+
+    def covariance(self, index: int) -> Floats:
+        """Return the posterior's covariance of one candidate's parameters."""
         first = sum(len(values) for values in self.values[:index])
-        return np.sqrt(np.diag(self.spread)[first : first + len(self.values[index])])
+        own = slice(first, first + len(self.values[index]))
+        return self.spread[own, own]
 
     def reported_errors(self, index: int) -> Floats:
         """Return the standard deviations to report: with `INFERENCE.posterior_factor`, and what no log determines.

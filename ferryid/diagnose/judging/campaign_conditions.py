@@ -11,7 +11,7 @@ may still be estimated: it is reported as such.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import exp
@@ -38,7 +38,7 @@ from ferryid.diagnose.judging.campaign_evidence import (
     without_conditions,
 )
 from ferryid.diagnose.judging.claims import Claim, Figures
-from ferryid.diagnose.judging.credibility import felt, unfelt, value_doubt
+from ferryid.diagnose.judging.credibility import felt, interval_doubt, unfelt, value_doubt
 from ferryid.diagnose.judging.experiment_design import manoeuvre
 from ferryid.diagnose.judging.figure_data import axis_of_errors, error_columns
 from ferryid.diagnose.judging.finding import Finding, Rival
@@ -81,9 +81,9 @@ class PlaceboTest:
 
     @property
     def beaten(self) -> bool:
-        """True where evidence and held-out data speak for the condition, and most of what it explains is its own."""
+        """True where evidence and held-out data surely speak for the condition, and most of what it explains is its own."""
         odds = self.evidence / INFERENCE.posterior_factor**2
-        return self.gain.total > 0.0 and odds >= JUDGING.placebo_evidence and self.own
+        return self.gain.low > 0.0 and odds >= JUDGING.placebo_evidence and self.own
 
 
 @dataclass(frozen=True)
@@ -202,9 +202,15 @@ class ConditionTest:
 
     def value_doubt(self, i: int) -> str:
         """Return why what a log has of it is not credible, or not felt, as the end of a sentence; empty where it is."""
-        values = dict(zip((one.name for one in self.parameters), self.condition(i)[0].tolist(), strict=True))
+        value, covariance = self.condition(i)
+        estimates = estimates_of(self.parameters, value, covariance)
+        values = {name: one.value for name, one in estimates.items()}
         profile = self.fit.campaign.members[i].plain.measurements.profile
-        return value_doubt(effects()[self.effect], self.parameters, values, profile) or unfelt(self.felt[i])
+        return (
+            value_doubt(effects()[self.effect], self.parameters, values, profile)
+            or interval_doubt(self.parameters, estimates, covariance)
+            or unfelt(self.felt[i])
+        )
 
     @property
     def probability(self) -> float:
@@ -371,11 +377,7 @@ def _finding(test: ConditionTest, i: int, tests: tuple[ConditionTest, ...]) -> F
     seen = 1.0 - exp(-0.5 * float(away @ np.linalg.solve(covariance, away)))
     if seen <= JUDGING.hint_probability:
         return None
-    error = np.sqrt(np.diag(covariance))
-    estimates = {
-        one.name: Estimate.normal(float(at), float(e), one.unit)
-        for one, at, e in zip(parameters, value, error, strict=True)
-    }
+    estimates = estimates_of(parameters, value, covariance)
     errors = LogErrors.of(fit, test.loss, i)
     improvement = errors.removed
     gained = np.maximum(improvement, 0.0)
@@ -406,6 +408,15 @@ def _finding(test: ConditionTest, i: int, tests: tuple[ConditionTest, ...]) -> F
         course=test.courses[i] if test.courses else None,
         **_figure(test, i, errors, shares, value),
     )
+
+
+def estimates_of(parameters: Sequence[Parameter], value: Floats, covariance: Floats) -> dict[str, Estimate]:
+    """Return what a log has of a condition by name, with its 95 % intervals."""
+    error = np.sqrt(np.diag(covariance))
+    return {
+        one.name: Estimate.normal(float(at), float(e), one.unit)
+        for one, at, e in zip(parameters, value, error, strict=True)
+    }
 
 
 def _figure(test: ConditionTest, i: int, errors: LogErrors, shares: Floats, value: Floats) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from ferryid.diagnose.inference.group_differences import compare_estimated, scat
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.campaign_evidence import Gain, held_out_loss
-from ferryid.diagnose.judging.credibility import felt, unfelt, value_doubt
+from ferryid.diagnose.judging.credibility import felt, interval_doubt, unfelt, value_doubt
 from ferryid.diagnose.judging.experiment_design import manoeuvre
 from ferryid.diagnose.judging.finding import Finding, Rival
 from ferryid.diagnose.judging.rivals import same_curve
@@ -188,24 +188,24 @@ def tested(made: CampaignFit, candidate: Candidate, rivals: Sequence[TriedProper
     ]
     value, error = _estimate(made, candidate)
     unreported = frozenset.intersection(*(effect.unreported(one, value) for one in seen))
-    reported = [
-        (one, float(at), float(e))
+    estimates = {
+        one.name: Estimate.normal(float(at), float(e), one.unit)
         for one, at, e in zip(candidate.parameters, value, error, strict=True)
         if one.name not in unreported
-    ]
+    }
     evidence = made.evidence - without.evidence
     others = [one for one in rivals if one.candidate.key not in {each.key for each in made.campaign.properties}]
     others.sort(key=lambda one: -one.odds)
     return PropertyTest(
         candidate,
-        {one.name: Estimate.normal(at, e, one.unit) for one, at, e in reported},
+        estimates,
         evidence,
         Gain.of(gains),
         (sum(one > 0.0 for one in by_log), len(by_log)),
         np.asarray(1.0 - squares[1] / np.where(squares[0] > 0.0, squares[0], np.inf)),
         tuple(Rival(one.candidate.effect.id, one.candidate.instance, min(one.odds, 0.0)) for one in others),
         tuple(one.candidate.effect.id for one in others if same_curve(one.candidate, candidate, one.share)),
-        _credibility(made, candidate, {one.name: at for one, at, _ in reported}),
+        _credibility(made, candidate, estimates),
         _out_of_step(made, candidate, without) if effect.id in OUT_OF_STEP else None,
     )
 
@@ -218,10 +218,13 @@ def _out_of_step(made: CampaignFit, candidate: Candidate, without: CampaignFit) 
     )
 
 
-def _credibility(made: CampaignFit, candidate: Candidate, values: Mapping[str, float]) -> str:
+def _credibility(made: CampaignFit, candidate: Candidate, estimates: Mapping[str, Estimate]) -> str:
     """Return why a property cannot be true of the vessel, or would be felt in no log, as the end of a sentence."""
     profile = made.campaign.members[0].plain.measurements.profile
+    values = {name: one.value for name, one in estimates.items()}
     if doubt := value_doubt(candidate.effect, candidate.parameters, values, profile):
+        return doubt
+    if doubt := interval_doubt(candidate.parameters, estimates):
         return doubt
     if candidate.effect.scales and not made.campaign.hull.known and len(profile.actuators) == 1:
         return "without a hull model, a factor on the masses and the damping does the same as one on the only actuator"

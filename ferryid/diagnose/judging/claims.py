@@ -53,6 +53,8 @@ class Figures:
         Share of a disturbance's power that the velocities show, about its peak.
     gain_in_velocities
         Evidence for a disturbance in the velocities alone [nat].
+    seen_twice
+        True where pose and velocity of the axis on which a disturbance is strongest come from two sensors.
     other_logs
         What the other logs of a campaign say of a law; None where there are none.
     beyond_feedback
@@ -76,6 +78,7 @@ class Figures:
     passes: float = inf
     power_in_velocities: float = inf
     gain_in_velocities: float = inf
+    seen_twice: bool = True
     other_logs: OtherLogs | None = None
     beyond_feedback: bool = False
     sets_in: bool = False

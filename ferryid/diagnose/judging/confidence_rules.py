@@ -137,6 +137,17 @@ def absent_in_velocities(finding: Finding, context: Context, threshold: float) -
     return lowered(replace(finding, says=says)), ""
 
 
+@rule()
+def seen_by_one_sensor(finding: Finding, context: Context, _threshold: float) -> Outcome:
+    """Lower a disturbance on an axis of which one sensor alone tells: nothing sets its errors apart from a force."""
+    if context.own.kind != "disturbance" or context.own.seen_twice:
+        return finding, ""
+    return _because(
+        finding,
+        "pose and velocity come from one sensor on the axis on which it is strongest, whose errors look the same",
+    )
+
+
 @rule(JUDGING.claimed_share, "of a finding's improvement")
 def improves_no_claimed_axis(finding: Finding, context: Context, threshold: float) -> Outcome:
     """Lower what improves neither force nor free run, by an interval that excludes zero, on an axis that it claims.
@@ -396,6 +407,25 @@ def not_of_all_logs(finding: Finding, context: Context, _threshold: float) -> Ou
     return _because(finding, "a property of the vessel would be in all of its logs, which together do not confirm it")
 
 
+@rule()
+def begins_as_no_event(finding: Finding, context: Context, _threshold: float) -> Outcome:
+    """Lower a property of the vessel in a part of one log of a campaign, unless it stands out there as an event.
+
+    A hull that is known from the logs alone is known as far as all manoeuvres go on average. In those of a part of one log it
+    may be off, and a force that is weaker there is one way of saying so; see `ferryid.diagnose.judging.onset_evidence`.
+    """
+    log, known = context.log, effects().get(finding.effect)
+    begins = finding.onset_s is not None or finding.offset_s is not None
+    of_vessel = context.own.kind == "force" and known is not None and known.vessel
+    if log.hull_known or not log.joint or not of_vessel or not begins or context.own.sets_in:
+        return finding, ""
+    return _because(
+        finding,
+        "one log shows it, in a part of it, where a hull that is known from the logs alone may be off in some manoeuvres, and "
+        "it does not stand out as an event",
+    )
+
+
 def lasting(finding: Finding) -> bool:
     """Return whether a finding is a property of the vessel throughout a log."""
     known = effects().get(finding.effect)
@@ -407,6 +437,7 @@ RULES: tuple[ConfidenceRule, ...] = (
     nothing_estimated,
     law_of_one_log,
     absent_in_velocities,
+    seen_by_one_sensor,
     not_credible,
     beside_incredible_hull,
     improves_no_claimed_axis,
@@ -425,6 +456,7 @@ RULES: tuple[ConfidenceRule, ...] = (
     out_of_step_beside_disturbance,
     absent_in_other_logs,
     not_of_all_logs,
+    begins_as_no_event,
 )
 """In the order in which they are applied: what a rule reads of other findings has been settled by those before it."""
 

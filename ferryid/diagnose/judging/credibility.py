@@ -6,7 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import chi2, norm
 
+from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit
 from ferryid.diagnose.inference.force_errors import mass_of
@@ -138,6 +140,40 @@ def value_doubt(effect: Effect, parameters: Sequence[Parameter], values: Mapping
         if one.name in values and one.at_bound(values[one.name]):
             return f"its {one.name.replace('_', ' ')} of {values[one.name]:.3g} {one.unit} stands at the bound of its search"
     return ""
+
+
+def interval_doubt(
+    parameters: Sequence[Parameter], estimates: Mapping[str, Estimate], covariance: Floats | None = None
+) -> str:
+    """Return that 95 % intervals hold none of an effect at all, as the end of a sentence; empty where one does not.
+
+    Evidence says that something is better than nothing in its place; an interval says that this effect is. Places and times
+    have no size, as in `ferryid.diagnose.inference.estimation.Fit.reported_errors`.
+
+    Parameters
+    ----------
+    parameters
+        Of the effect, with the values at which it does nothing.
+    estimates
+        Those that are reported, by name.
+    covariance
+        Of all parameters, shape (p, p), up to the errors that are reported: components that are known along one direction only
+        differ from none together where neither does by itself. Where None, each is judged by itself.
+    """
+    sized = [k for k, one in enumerate(parameters) if one.name in estimates and one.unit == parameters[0].unit]
+    told = [estimates[parameters[k].name] for k in sized]
+    neutral = np.array([parameters[k].neutral for k in sized])
+    if not sized or any(not one.low <= none <= one.high for one, none in zip(told, neutral.tolist(), strict=True)):
+        return ""
+    if covariance is not None and len(sized) > 1:
+        spread = np.sqrt(np.diag(covariance)[sized])
+        if (spread > 0.0).all():
+            error = np.array([(one.high - one.low) / (2.0 * norm.ppf(0.975)) for one in told])
+            away = (np.array([one.value for one in told]) - neutral) / error
+            alike = covariance[np.ix_(sized, sized)] / np.outer(spread, spread)
+            if float(away @ np.linalg.solve(alike, away)) > chi2.ppf(0.95, len(sized)):
+                return ""
+    return "its 95 % interval holds none of it at all"
 
 
 def felt(made: CampaignFit, common: Floats, own: Floats) -> Floats:

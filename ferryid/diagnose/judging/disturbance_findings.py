@@ -133,6 +133,7 @@ def _claim(
             "disturbance",
             power_in_velocities=power_in_velocities,
             gain_in_velocities=state.gain_in_velocities,
+            seen_twice=measurements.seen_twice(int(np.argmax(power))),
             cycles=_cycles(state, pushes),
             doubt=doubt,
         ),

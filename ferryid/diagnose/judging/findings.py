@@ -26,7 +26,7 @@ from ferryid.diagnose.inference.profile_likelihood import intervals
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.backward_elimination import Elimination
 from ferryid.diagnose.judging.claims import Claim, Figures
-from ferryid.diagnose.judging.credibility import value_doubt
+from ferryid.diagnose.judging.credibility import interval_doubt, value_doubt
 from ferryid.diagnose.judging.experiment_design import manoeuvre
 from ferryid.diagnose.judging.figure_data import figure_columns, figure_regressor
 from ferryid.diagnose.judging.finding import Finding, Rival
@@ -122,6 +122,9 @@ def _force_claim(
         ),
     )
     figures = _figures(problem, candidate, values, reported, proof, removed)
+    figures = replace(
+        figures, doubt=figures.doubt or interval_doubt(candidate.parameters, estimates, kept.covariance(i))
+    )
     if proof is not None and candidate.effect.id in OUT_OF_STEP:
         beyond = proof.improvement.score_low > feedback_of(problem, kept).high
         figures = replace(figures, beyond_feedback=beyond)

@@ -108,7 +108,7 @@ def sensor_claims(log: ScreenedLog) -> tuple[Claim, ...]:
                 says=one.says,
                 vessel=one.vessel,
             ),
-            Figures("sensor", doubt=_doubt(one, log.measurements.profile)),
+            Figures("sensor", doubt=one.doubt or _doubt(one, log.measurements.profile)),
         )
         for one in log.sensors
     )

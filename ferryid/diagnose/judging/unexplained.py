@@ -35,6 +35,7 @@ from ferryid.types import AXES, Floats
 
 SPANS = 5
 """Intervals that are told."""
+ONE_SENSOR = "as the velocity is the slope of the position or heading"
 
 
 @dataclass(frozen=True)
@@ -94,20 +95,24 @@ def find_unexplained(
     burst = bursts_of(refitted, fitted_force_model(refitted.plain, after), measurements)
     notes: list[str] = []
     if burst is not None and burst.deviations >= JUDGING.burst_deviations:
-        if _is_force(burst.in_positions):
+        twice = measurements.seen_twice(int(np.argmax(burst.shares)))
+        if twice and _is_force(burst.in_positions):
             uneven = True
             if not known:
                 claims.append(Claim(_in_bursts(burst), Figures("bursts")))
         else:
-            notes.append(_sensor_bursts(burst))
+            notes.append(_sensor_bursts(burst, twice=twice))
     elif uneven and not known:
-        if _is_force(_in_positions(refitted, after, int(np.argmax(left.shares)))):
+        axis = int(np.argmax(left.shares))
+        twice = measurements.seen_twice(axis)
+        if twice and _is_force(_in_positions(refitted, after, axis)):
             claims.append(Claim(_unsteady(refitted, left), Figures("unsteady")))
         else:
             uneven = False
-            axis = AXES[int(np.argmax(left.shares))]
+            slope = "uvr"[axis] in measurements.slopes
+            seen = f"{ONE_SENSOR}, no other sensor" if slope else "no position"
             notes.append(
-                f"In the velocities the error comes and goes, most in {axis}, and no position shows the same: "
+                f"In the velocities the error comes and goes, most in {AXES[axis]}, and {seen} shows the same: "
                 "it may be noise of a sensor."
             )
     return Unexplained(tuple(claims), left, uneven, tuple(notes))
@@ -133,10 +138,12 @@ def _in_positions(problem: EstimationProblem, kept: Fit, axis: int) -> tuple[flo
     return shown_share(errors[:, axis], seen[:, axis], max(1, length))
 
 
-def _sensor_bursts(burst: Burst) -> str:
+def _sensor_bursts(burst: Burst, *, twice: bool) -> str:
     axis = int(np.argmax(burst.shares))
     if burst.in_positions is None:
         seen = "as there are no positions, nothing shows whether it is a force"
+    elif not twice:
+        seen = f"{ONE_SENSOR}, nothing shows whether it is a force"
     elif burst.in_positions[0] < JUDGING.power_in_positions:
         seen = "the positions do not show it, so that it is noise of the velocities"
     else:

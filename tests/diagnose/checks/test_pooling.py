@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from ferryid.diagnose.checks import clock_offset, examine, examine_together
-from ferryid.diagnose.checks.check import Lasting, SensorFinding
+from ferryid.diagnose.checks import clock_offset, examine, examine_together, yaw_rate_scale
+from ferryid.diagnose.checks.check import Check, Lasting, SensorFinding
 from ferryid.diagnose.checks.pooling import Common, Examined, pool, pool_check
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
@@ -128,6 +129,25 @@ def test_what_logs_show_that_differ_from_the_rest_is_not_what_the_rest_have() ->
     pool_check(check, (), again)
     assert [[each.vessel for each in one.findings] for one in again] == [[False], [False], *[[True]] * 4]
     assert "2 of 6 logs show it by themselves, 2 logs differ from it" in again[2].findings[0].says
+
+
+def test_a_scale_that_differs_from_log_to_log_is_no_instruments() -> None:
+    def scales(check: Check, *values: float) -> list[Examined]:
+        every = [Examined({check.id: SensorFinding(check.id, *shown(one))}, turning(7, 30.0)) for one in values]
+        pool_check(check, (), every)
+        return every
+
+    def shown(value: float) -> tuple[dict[str, Estimate], str, Callable[[Measurements], Measurements]]:
+        return {"factor": Estimate.normal(value, 0.005, "-")}, "Scaled.", lambda one: one
+
+    found = scales(yaw_rate_scale.CHECK, 1.037, 1.106, 1.2)
+    assert all("its size differs between the logs" in one.findings[0].doubt for one in found)
+    assert all(one.findings[0].vessel and not one.findings[0].doubt for one in scales(yaw_rate_scale.CHECK, 1.1, 1.1))
+    # One log alone has nothing to compare with, and a clock may be set anew for every log.
+    assert scales(yaw_rate_scale.CHECK, 1.1)[0].findings[0].doubt == ""
+    clocks = [Examined({"clock_offset": own(one)}, turning(7, 30.0)) for one in (0.5, 1.5)]
+    pool_check(clock_offset.CHECK, (), clocks)
+    assert [one.findings[0].doubt for one in clocks] == ["", ""]
 
 
 def own(seconds: float) -> SensorFinding:

@@ -177,6 +177,11 @@ def test_a_placebo_may_have_half_or_little_more_than_it_imitates(share: float, i
     assert PlaceboTest(Gain(1.0, 0.5, 1.5), 99.0, share, imitated).own is own
 
 
+def test_a_placebo_is_beaten_where_held_out_data_surely_speak_against_it() -> None:
+    assert PlaceboTest(Gain(30.0, 0.1, 60.0), 99.0, 0.0).beaten
+    assert not PlaceboTest(Gain(30.0, -25.0, 79.0), 99.0, 0.0).beaten
+
+
 def test_winds_are_confirmed_over_all_logs_and_a_current_is_not() -> None:
     judged = judge_conditions(campaign(conditions=("wind", "current")), {"a": 0, "b": 1, "c": 2}, no_progress)
     confirmed = [one.effect for one in judged.tests if one.confirmed]

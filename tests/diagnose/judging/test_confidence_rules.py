@@ -18,6 +18,7 @@ from ferryid.diagnose.judging.confidence_rules import (
     absent_in_other_logs,
     absent_in_velocities,
     apply_rules,
+    begins_as_no_event,
     few_cycles,
     hull_from_this_log,
     improves_no_claimed_axis,
@@ -34,6 +35,7 @@ from ferryid.diagnose.judging.confidence_rules import (
     pose_jumps,
     predictive,
     removes_little,
+    seen_by_one_sensor,
     too_brief,
     unexplained_shares,
     with_another_force,
@@ -61,7 +63,7 @@ def on(kind: Kind, **figures: object) -> Context:
 
 def test_every_rule_has_a_name_a_line_and_its_unit() -> None:
     names = [one.name for one in RULES]
-    assert len(names) == len(set(names)) == 22
+    assert len(names) == len(set(names)) == 24
     for one in RULES:
         assert one.about.endswith((".", ":", ",")) or one.about, one.name
         assert (one.threshold is None) == (one.unit == ""), one.name
@@ -110,6 +112,13 @@ def test_a_disturbance_that_the_velocities_lack_is_a_hint() -> None:
     judged, _ = absent_in_velocities(found("waves"), on("disturbance", gain_in_velocities=odds))
     assert judged is not None
     assert not judged.sure
+
+
+def test_a_disturbance_that_one_sensor_shows_is_a_hint() -> None:
+    assert stands(seen_by_one_sensor, found("waves"), on("disturbance"))
+    assert not stands(seen_by_one_sensor, found("waves"), on("disturbance", seen_twice=False))
+    # A steady force moves the vessel farther than a sensor errs.
+    assert stands(seen_by_one_sensor, found("wind"), on("force", seen_twice=False))
 
 
 @pytest.mark.parametrize(
@@ -324,6 +333,19 @@ def test_what_all_logs_do_not_confirm_is_no_property_of_one(logs: int, weighed: 
     assert stands(not_of_all_logs, loss, Context(Figures("property"), figures))
     assert stands(not_of_all_logs, replace(loss, onset_s=30.0), Context(Figures("force"), figures))
     assert stands(not_of_all_logs, found("wind"), Context(Figures("force"), figures))
+
+
+def test_a_weak_thruster_in_a_part_of_one_log_is_no_event_where_the_logs_bring_the_hull() -> None:
+    weak = replace(found("thruster_gain"), onset_s=6.0)
+    joint = LogFigures(hull_known=False, joint=True)
+    assert not stands(begins_as_no_event, weak, Context(Figures("force"), joint))
+    assert not stands(begins_as_no_event, replace(weak, onset_s=None, offset_s=78.0), Context(Figures("force"), joint))
+    assert stands(begins_as_no_event, weak, Context(Figures("force", sets_in=True), joint))
+    # Nor is that asked of what all logs share, of conditions, beside a hull that is known, or of one log: it has its own rule.
+    assert stands(begins_as_no_event, replace(weak, onset_s=None), Context(Figures("force"), joint))
+    assert stands(begins_as_no_event, replace(found("wind"), onset_s=6.0), Context(Figures("force"), joint))
+    assert stands(begins_as_no_event, weak, Context(Figures("force"), replace(joint, hull_known=True)))
+    assert stands(begins_as_no_event, weak, Context(Figures("force"), replace(joint, joint=False)))
 
 
 def test_a_rule_sees_the_findings_as_those_before_it_left_them() -> None:

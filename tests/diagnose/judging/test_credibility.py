@@ -9,6 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging import conclude
@@ -21,6 +22,7 @@ from ferryid.diagnose.judging.credibility import (
     RefittedHull,
     campaign_hull,
     impossible_masses,
+    interval_doubt,
     refitted_hull,
     unfelt,
     value_doubt,
@@ -186,6 +188,54 @@ def test_beside_a_hull_that_cannot_be_nothing_is_sure_but_what_kinematics_shows(
     assert bool(notes) != common
 
 
+def intervals(**ends: tuple[float, float]) -> dict[str, Estimate]:
+    return {name: Estimate(0.5 * (low + high), low, high, "-") for name, (low, high) in ends.items()}
+
+
+NONE = "its 95 % interval holds none of it at all"
+
+
+@pytest.mark.parametrize(
+    ("effect", "ends", "why"),
+    [
+        ("thruster_gain", {"factor": (-2.1, 2.1)}, NONE),
+        ("thruster_gain", {"factor": (0.4, 0.9)}, ""),
+        # An end of what is possible at which nothing acts is within the interval.
+        ("thruster_lag", {"time_constant": (0.0, 0.8)}, NONE),
+        ("wind", {"north": (-2.0, 1.0), "east": (0.1, 3.0)}, ""),
+        ("wind", {"north": (-2.0, 1.0), "east": (-0.1, 3.0)}, NONE),
+        # Where a line leads to is no size of it.
+        (
+            "mooring",
+            {
+                "stiffness_north": (0.0, 0.18),
+                "stiffness_east": (0.0, 0.19),
+                "north": (-31.0, 29.0),
+                "east": (-83.0, -16.0),
+            },
+            NONE,
+        ),
+        ("payload", {"mass": (0.0, 80.0), "x": (0.5, 1.0)}, NONE),
+        # What is not reported has no say, nor have times.
+        ("hull_parameters", {}, ""),
+    ],
+)
+def test_what_may_as_well_be_none_is_doubted(effect: str, ends: dict[str, tuple[float, float]], why: str) -> None:
+    assert interval_doubt(effects()[effect].parameters_of(FERRY), intervals(**ends)) == why
+
+
+def test_a_wind_that_is_known_along_one_direction_alone_is_not_none() -> None:
+    ends = intervals(north=(-1.0, 3.0), east=(-1.0, 3.0))
+    wind = effects()["wind"].parameters_of(FERRY)
+    covariance = np.eye(len(wind))
+    assert interval_doubt(wind, ends, covariance) == NONE
+    # Across the bearing nothing is known; along it, it blows.
+    covariance[0, 1] = covariance[1, 0] = -0.9
+    assert interval_doubt(wind, ends, covariance) == ""
+    covariance[0, 1] = covariance[1, 0] = 0.9
+    assert interval_doubt(wind, ends, covariance) == NONE
+
+
 def condition(axes: tuple[float, float, float], share: float) -> ConditionTest:
     """Return a wind that the evidence favours, with the errors that it leaves by axis, of one, and how much it is felt."""
     plain = SimpleNamespace(hull=np.array([1.0, 1.0, 0.0, 0.0, 1.0]), measurements=SimpleNamespace(profile=FERRY))
@@ -193,7 +243,7 @@ def condition(axes: tuple[float, float, float], share: float) -> ConditionTest:
     wind = SimpleNamespace(effect=SimpleNamespace(id="wind"))
     members = (SimpleNamespace(plain=plain, windows=None),) * 2
     campaign = SimpleNamespace(members=members, own=own, conditions=(wind,))
-    fit = SimpleNamespace(campaign=campaign, condition=lambda i, k: (np.array([1.0, 29.9 * i]), np.eye(2)))
+    fit = SimpleNamespace(campaign=campaign, condition=lambda i, k: (np.array([3.0, 29.9 * i]), np.eye(2)))
     loss = tuple(
         HeldOutLoss(np.ones(1), np.zeros(1, dtype=int), (np.ones((4, 3)) * np.sqrt(each),) * 2)
         for each in ((1.0, 1.0, 1.0), axes)
@@ -219,8 +269,11 @@ def test_a_condition_that_makes_an_axis_worse_or_is_not_felt_is_not_confirmed() 
     assert steady.confirmed
     assert steady.value_doubt(0) == ""
     assert steady.value_doubt(1) == "its east of 29.9 m/s stands at the bound of its search"
-    steady.__dict__["fit"].condition = lambda i, k: (np.ones(2), np.eye(2))
+    steady.__dict__["fit"].condition = lambda i, k: (3.0 * np.ones(2), np.eye(2))
     assert "less than 2 %" in steady.value_doubt(1)
+    # A log that may as well have none of it.
+    steady.__dict__["fit"].condition = lambda i, k: (np.ones(2), np.eye(2))
+    assert steady.value_doubt(0) == "its 95 % interval holds none of it at all"
 
 
 def test_one_axis_is_enough_to_be_felt() -> None:

@@ -134,6 +134,11 @@ def test_bursts_are_told_by_band_and_time() -> None:
     assert made.unsteady
     (claim,) = made.claims
     told = claim.finding
+    # The same of a log whose velocities are slopes of its positions: those may be in error.
+    one = find_unexplained(problem, alone, replace(sailed(0), slopes=frozenset("uv")))
+    assert (one.claims, one.unsteady) == ((), False)
+    assert "as the velocity is the slope of the position or heading" in one.notes[0]
+    assert find_unexplained(problem, alone, replace(sailed(0), slopes=frozenset("r"))).claims
     assert told.law == ()
     assert told.band_hz == (0.2, 0.4)
     assert max(told.axes, key=lambda axis: told.axes[axis]) == "sway"
