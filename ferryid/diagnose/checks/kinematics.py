@@ -15,14 +15,14 @@ between the two where positions are noisy as well, which is why a finding has to
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.diagnose.checks.regression import Solution, independence, step
+from ferryid.diagnose.checks.regression import Solution, independence, scatter, step
 from ferryid.diagnose.checks.spans import Spans, spans
 from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.effects.force_model import Measurements
@@ -183,11 +183,33 @@ def kinematics(measurements: Measurements, forced: tuple[int, ...] = ()) -> Kine
         if searched is None:
             return None
     p, solution, active = searched
+    if active[SCALE]:
+        errors = solution.errors.copy()
+        errors[SCALE] *= scatter(_factors_of_parts(data, p), 0)
+        solution = replace(solution, errors=errors)
     rival = _solve(data, p, active, own=True)
     if rival is None:
         return None
     short = independence(data.problem.place)[1] > 1.0
     return Kinematics(active, solution, rival[0], data.problem.middle_s, data.derivatives(p), data.residual(p), short)
+
+
+def _factors_of_parts(data: _Data, p: Floats) -> list[Solution | None]:
+    """Return by how much the factor is another in each half of the log, to the north and to the east."""
+    e, J, Z = data.residual(p), data.derivatives(p), data.instruments(p)
+    return [
+        step(
+            Z[rows, way : way + 1, SCALE : SCALE + 1],
+            J[rows, way : way + 1, SCALE : SCALE + 1],
+            e[rows, way : way + 1],
+            data.problem.place[rows],
+            SIZE[[SCALE]],
+            np.zeros(1),
+            *independence(data.problem.place[rows]),
+        )
+        for rows in np.array_split(np.arange(len(e)), 2)
+        for way in (0, 1)
+    ]
 
 
 def _slope(values: Floats, rows: int) -> Floats:

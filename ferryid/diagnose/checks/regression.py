@@ -5,6 +5,7 @@ Nothing is whitened: vessels move slowly, whitening would weigh the fast rest, i
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,6 +46,22 @@ class Solution:
     def certain(self, index: int, neutral: float = 0.0) -> bool:
         """Return whether a parameter is not neutral, beyond reasonable doubt."""
         return self.score(index, neutral) > float(stdtrit(self.freedom, 1.0 - 0.5 * CHECKS.false_alarm))
+
+
+def scatter(parts: Sequence[Solution | None], index: int) -> float:
+    """Return by what an error of a parameter is too small where parts of a log disagree about it more than theirs allow.
+
+    It is Birge's ratio (1932, Physical Review 40): the root of chi-squared over its degrees of freedom, at least one. A factor
+    of an instrument is the same throughout; what resembles one, as a filter of a receiver that takes more from fast motions,
+    is not. Errors of few degrees of freedom scatter by themselves, which is taken off.
+    """
+    known = [one for one in parts if one is not None and one.freedom >= CHECKS.part_freedom]
+    if len(known) < 2:
+        return 1.0
+    values = np.array([one.values[index] for one in known])
+    weights = np.array([(one.freedom - 2.0) / one.freedom * one.errors[index] ** -2.0 for one in known])
+    mean = float(weights @ values / weights.sum())
+    return float(np.sqrt(max(weights @ (values - mean) ** 2 / (len(known) - 1), 1.0)))
 
 
 def independence(place: NDArray[np.int64]) -> tuple[int, float]:

@@ -58,7 +58,7 @@ def screen_together(logs: Sequence[ScreenedLog], copies: Sequence[bool]) -> tupl
     examined = examine_together([one.measured.measurements for one in logs], [one.sensors for one in logs], copies)
     return tuple(
         ScreenedLog(log.measured, one.measurements, tuple(one.findings), tuple(one.notes))
-        if one.otherwise or one.notes
+        if one.otherwise or one.notes or any(each.doubt for each in one.findings)
         else log
         for log, one in zip(logs, examined, strict=True)
     )

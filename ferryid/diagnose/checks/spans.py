@@ -47,8 +47,8 @@ class Spans:
         """Number of each window, in strides from the start, shape (J,)."""
         return np.asarray(self.starts // self.stride, dtype=np.int64)
 
-    def only(self, chosen: NDArray[np.bool_]) -> Spans:
-        """Return some of the windows."""
+    def only(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Spans:
+        """Return some of the windows, by flags or places."""
         return replace(self, starts=self.starts[chosen], middle_s=self.middle_s[chosen])
 
     def mean(self, values: Floats) -> Floats:

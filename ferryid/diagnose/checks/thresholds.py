@@ -79,6 +79,12 @@ class CheckThresholds:
     least_rate_scale: float = threshold(
         0.02, "-", "least error of a yaw rate's scale", "convention: above the scale error of a low-cost gyro"
     )
+    part_freedom: int = threshold(
+        4,
+        "-",
+        "degrees of freedom of an error from which on a part of a log has a say in whether its parts agree",
+        "derived: the variance of Student's distribution is twice that of the normal one there, and infinite at two",
+    )
     filtered_scale: float = threshold(
         0.001,
         "-",

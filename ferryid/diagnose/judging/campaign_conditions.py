@@ -155,8 +155,16 @@ class ConditionTest:
         return estimate_courses(self.fit, self.place, turbulence) if self.confirmed and turbulence is not None else ()
 
     def condition(self, i: int) -> tuple[Floats, Floats]:
-        """Return what a log has of it, of a flow with a course its mean, and the covariance, shapes (q,) and (q, q)."""
-        return (self.courses[i].mean, self.courses[i].covariance) if self.courses else self.fit.condition(i, self.place)
+        """Return what a log has of it, of a flow with a course its mean, and the covariance, shapes (q,) and (q, q).
+
+        The covariance has in it what hull or instruments may be off anyway, as of any effect.
+        """
+        if self.courses:
+            value, covariance = self.courses[i].mean, self.courses[i].covariance
+        else:
+            value, covariance = self.fit.condition(i, self.place)
+        beyond = 0.5 * effects()[self.effect].negligible
+        return value, np.asarray(covariance + beyond**2 * np.eye(len(value)))
 
     @property
     def confirmed(self) -> bool:

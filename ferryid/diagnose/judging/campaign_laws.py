@@ -109,12 +109,16 @@ class VesselLaw:
 
     @property
     def holds(self) -> bool:
-        """True where two logs or more can show it, all that can do, and every term moves the vessel enough to matter.
+        """True where two logs or more can show it, all that can do, and every term is surely there and moves the vessel enough.
 
-        What is wrong in the same way in all logs, such as the arithmetic, holds in all of them but moves it by next to nothing.
+        A term whose 95 % interval holds none stands in for another of the law, or is one of its errors. What is wrong in the
+        same way in all logs, such as the arithmetic, holds in all of them but moves it by next to nothing.
         """
         return bool(
-            self.able.sum() >= 2 and (self.gains[self.able] > 0.0).all() and (self.moves >= INFERENCE.void_share).all()
+            self.able.sum() >= 2
+            and (self.gains[self.able] > 0.0).all()
+            and (np.abs(self.values) > 1.96 * self.errors).all()
+            and (self.moves >= INFERENCE.void_share).all()
         )
 
 

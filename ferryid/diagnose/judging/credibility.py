@@ -145,7 +145,7 @@ def value_doubt(effect: Effect, parameters: Sequence[Parameter], values: Mapping
 def interval_doubt(
     parameters: Sequence[Parameter], estimates: Mapping[str, Estimate], covariance: Floats | None = None
 ) -> str:
-    """Return that 95 % intervals hold none of an effect at all, as the end of a sentence; empty where one does not.
+    """Return that 95 % intervals hold none of an effect at all, as the end of a sentence; empty where they do not.
 
     Evidence says that something is better than nothing in its place; an interval says that this effect is. Places and times
     have no size, as in `ferryid.diagnose.inference.estimation.Fit.reported_errors`.
@@ -157,23 +157,24 @@ def interval_doubt(
     estimates
         Those that are reported, by name.
     covariance
-        Of all parameters, shape (p, p), up to the errors that are reported: components that are known along one direction only
-        differ from none together where neither does by itself. Where None, each is judged by itself.
+        Of all parameters, shape (p, p), up to the errors that are reported: components such as north and east are judged by
+        their common 95 % region. Where None, by the interval of each.
     """
     sized = [k for k, one in enumerate(parameters) if one.name in estimates and one.unit == parameters[0].unit]
     told = [estimates[parameters[k].name] for k in sized]
     neutral = np.array([parameters[k].neutral for k in sized])
-    if not sized or any(not one.low <= none <= one.high for one, none in zip(told, neutral.tolist(), strict=True)):
+    inside = [one.low <= none <= one.high for one, none in zip(told, neutral.tolist(), strict=True)]
+    if not sized:
         return ""
-    if covariance is not None and len(sized) > 1:
+    none = all(inside)
+    if covariance is not None and len(sized) > 1 and (np.diag(covariance)[sized] > 0.0).all():
         spread = np.sqrt(np.diag(covariance)[sized])
-        if (spread > 0.0).all():
-            error = np.array([(one.high - one.low) / (2.0 * norm.ppf(0.975)) for one in told])
-            away = (np.array([one.value for one in told]) - neutral) / error
-            alike = covariance[np.ix_(sized, sized)] / np.outer(spread, spread)
-            if float(away @ np.linalg.solve(alike, away)) > chi2.ppf(0.95, len(sized)):
-                return ""
-    return "its 95 % interval holds none of it at all"
+        # An interval that ends where nothing acts is cut there: its other end tells the error.
+        half = np.array([max(one.high - one.value, one.value - one.low) for one in told])
+        away = norm.ppf(0.975) * (np.array([one.value for one in told]) - neutral) / np.maximum(half, 1e-300)
+        alike = covariance[np.ix_(sized, sized)] / np.outer(spread, spread)
+        none = float(away @ np.linalg.solve(alike, away)) <= chi2.ppf(0.95, len(sized))
+    return "its 95 % interval holds none of it at all" if none else ""
 
 
 def felt(made: CampaignFit, common: Floats, own: Floats) -> Floats:

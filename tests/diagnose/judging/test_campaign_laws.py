@@ -80,6 +80,13 @@ def test_what_hardly_moves_the_vessel_is_no_law() -> None:
     assert select_campaign_law([replace(says(1.0, 0.1), moves=np.array([0.01]))] * 3) is None
 
 
+def test_a_term_that_may_as_well_be_none_is_no_law() -> None:
+    law = select_campaign_law([says(1.0, 0.1)] * LOGS)
+    assert law is not None
+    assert law.holds
+    assert not replace(law, errors=np.abs(law.values) / 1.9).holds
+
+
 def test_what_belongs_to_the_water_is_no_law_of_the_vessel() -> None:
     for key in (("north", "1"), ("sway", "cos(2·heading)")):
         assert select_campaign_law([says(1.0, 0.1, key)] * 3) is None

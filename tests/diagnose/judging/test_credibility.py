@@ -234,6 +234,11 @@ def test_a_wind_that_is_known_along_one_direction_alone_is_not_none() -> None:
     assert interval_doubt(wind, ends, covariance) == ""
     covariance[0, 1] = covariance[1, 0] = 0.9
     assert interval_doubt(wind, ends, covariance) == NONE
+    # A common region is wider than the interval of each: 2.2 standard deviations to the north and nothing to the east.
+    ends = intervals(north=(0.1, 1.9), east=(-1.0, 1.0))
+    assert interval_doubt(wind, ends) == ""
+    assert interval_doubt(wind, ends, np.eye(len(wind))) == NONE
+    assert interval_doubt(wind, intervals(north=(0.4, 1.6), east=(-1.0, 1.0)), np.eye(len(wind))) == ""
 
 
 def condition(axes: tuple[float, float, float], share: float) -> ConditionTest:
