@@ -100,7 +100,8 @@ def bursts_of(problem: EstimationProblem, force_model: ForceModel, measurements:
     """Return the most telling band in which the power of the force error comes and goes; None where there are no bands.
 
     The power of blocks is compared with an even one, as that of noise would be: of a band of width B, a block of length T holds
-    2 B T independent values, of which the mean square's logarithm has a known variance.
+    2 B T independent values, of which the mean square's logarithm has a known variance. Between samples all signals are lines:
+    what a band has of few samples a period is missing in forces and motions in different ways, and resembles a force.
     """
     short = fine_windows(problem, measurements)
     errors = force_errors(short, force_model, problem.plain)
@@ -108,7 +109,7 @@ def bursts_of(problem: EstimationProblem, force_model: ForceModel, measurements:
     found = []
     for low, high in pairwise(BURST_HZ):
         block_s = max(BURST_S, BURST_PERIODS / high)
-        if high < 0.5 / short.measurements.step_s:
+        if high < 0.5 / short.measurements.step_s and high * INFERENCE.burst_samples <= 1.0 / measurements.step_s:
             found.append(_uneven(short, errors, positions, low, high, block_s))
     uneven = [one for one in found if one is not None]
     return max(uneven, key=lambda one: one.deviations, default=None)

@@ -234,6 +234,12 @@ class InferenceThresholds:
         "convention: a third; 0.5 before",
     )
     burst_blocks: int = threshold(6, "blocks", "fewer are not searched for bursts", "convention: a median needs some")
+    burst_samples: float = threshold(
+        4.0,
+        "samples a period",
+        "of the fastest in a band, below which bursts in it are not searched",
+        "derived: lines between samples keep two thirds of the power there (sinc to the fourth of a quarter)",
+    )
     burst_level: float = threshold(
         3.0,
         "median powers",

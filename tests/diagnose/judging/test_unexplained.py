@@ -36,6 +36,7 @@ pytestmark = pytest.mark.slow
 FERRY = load_profile("milliampere")
 SECONDS, STEP_S = 720.0, 0.1
 T = np.arange(0.0, SECONDS, STEP_S)
+ROWS = ("t", "eta", "nu_raw", "nu", "parts", "angles", "usable")
 
 
 @cache
@@ -181,6 +182,20 @@ def test_even_noise_has_no_bursts() -> None:
         assert burst is not None
         strongest.append(burst.deviations)
     assert max(strongest) < JUDGING.burst_deviations
+
+
+def test_bursts_too_fast_for_the_samples_are_not_told() -> None:
+    burst = np.exp(-(((T - 200.0) / 15.0) ** 2)) + np.exp(-(((T - 500.0) / 15.0) ** 2))
+    problem = trial_with(pushes(sway=200.0 * burst * np.sin(2.0 * np.pi * 0.6 * T)))
+    model = fitted_force_model(problem.plain, fit(problem, ()))
+    told = bursts_of(problem, model, sailed(0))
+    assert told is not None
+    assert told.low_hz == 0.4
+    assert told.deviations > JUDGING.burst_deviations
+    # The same at 2 Hz, at which lines between the samples are no oscillation of 0.6 Hz.
+    slow = replace(sailed(0), **{name: getattr(sailed(0), name)[::5] for name in ROWS})
+    seen = bursts_of(problem, model, slow)
+    assert seen is None or seen.high_hz <= 0.4
 
 
 def test_a_wind_is_told_right_whose_moment_the_profile_has_too_large() -> None:
