@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,7 +62,8 @@ def scatter(parts: Sequence[Solution | None], index: int) -> float:
     values = np.array([one.values[index] for one in known])
     weights = np.array([(one.freedom - 2.0) / one.freedom * one.errors[index] ** -2.0 for one in known])
     mean = float(weights @ values / weights.sum())
-    return float(np.sqrt(max(weights @ (values - mean) ** 2 / (len(known) - 1), 1.0)))
+    excess = float(weights @ (values - mean) ** 2) / (len(known) - 1)
+    return sqrt(max(excess, 1.0))
 
 
 def independence(place: NDArray[np.int64]) -> tuple[int, float]:
