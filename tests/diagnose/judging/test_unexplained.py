@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from ferryid.diagnose.inference import spectra
 from ferryid.diagnose.inference.candidate_terms import terms_of
 from ferryid.diagnose.inference.estimation import (
     Candidate,
@@ -184,18 +185,17 @@ def test_even_noise_has_no_bursts() -> None:
     assert max(strongest) < JUDGING.burst_deviations
 
 
-def test_bursts_too_fast_for_the_samples_are_not_told() -> None:
-    burst = np.exp(-(((T - 200.0) / 15.0) ** 2)) + np.exp(-(((T - 500.0) / 15.0) ** 2))
-    problem = trial_with(pushes(sway=200.0 * burst * np.sin(2.0 * np.pi * 0.6 * T)))
+def test_bursts_too_fast_for_the_samples_are_not_searched(monkeypatch: pytest.MonkeyPatch) -> None:
+    searched: list[float] = []
+    monkeypatch.setattr(spectra, "_uneven", lambda short, errors, positions, low, high, block_s: searched.append(high))
+    problem = trial_with(pushes())
     model = fitted_force_model(problem.plain, fit(problem, ()))
-    told = bursts_of(problem, model, sailed(0))
-    assert told is not None
-    assert told.low_hz == 0.4
-    assert told.deviations > JUDGING.burst_deviations
-    # The same at 2 Hz, at which lines between the samples are no oscillation of 0.6 Hz.
-    slow = replace(sailed(0), **{name: getattr(sailed(0), name)[::5] for name in ROWS})
-    seen = bursts_of(problem, model, slow)
-    assert seen is None or seen.high_hz <= 0.4
+    bursts_of(problem, model, sailed(0))
+    assert searched == [0.1, 0.2, 0.4, 0.8]
+    searched.clear()
+    # At 2 Hz lines between the samples are no oscillation of 0.8 Hz.
+    bursts_of(problem, model, replace(sailed(0), **{name: getattr(sailed(0), name)[::5] for name in ROWS}))
+    assert searched == [0.1, 0.2, 0.4]
 
 
 def test_a_wind_is_told_right_whose_moment_the_profile_has_too_large() -> None:
