@@ -8,12 +8,18 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.effects.force_model import Measurements
 from ferryid.types import Floats
 
 LENGTH_S, STRIDE_S = 8.0, 2.0
 RATE_HZ = 5.0
 """Measurements are averaged down to this, all alike: windows are long against it."""
+
+
+def least_off(step_s: float, least: float) -> float:
+    """Return by how much a factor has to be off at least, in a log of rows so far apart [s]; `least` where they are near."""
+    return least if step_s * CHECKS.window_samples <= LENGTH_S else CHECKS.sparse_scale
 
 
 @dataclass(frozen=True)
@@ -47,8 +53,8 @@ class Spans:
         """Number of each window, in strides from the start, shape (J,)."""
         return np.asarray(self.starts // self.stride, dtype=np.int64)
 
-    def only(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Spans:
-        """Return some of the windows, by flags or places."""
+    def only(self, chosen: NDArray[np.bool_]) -> Spans:
+        """Return some of the windows."""
         return replace(self, starts=self.starts[chosen], middle_s=self.middle_s[chosen])
 
     def mean(self, values: Floats) -> Floats:

@@ -85,6 +85,18 @@ class CheckThresholds:
         "degrees of freedom of an error from which on a part of a log has a say in whether its parts agree",
         "derived: the variance of Student's distribution is twice that of the normal one there, and infinite at two",
     )
+    window_samples: float = threshold(
+        8.0,
+        "samples in a window",
+        "below which the fastest motions that it passes are not known well enough for a factor near one",
+        "derived: a window passes up to two periods, and lines between four samples a period keep two thirds of the power",
+    )
+    sparse_scale: float = threshold(
+        0.5,
+        "-",
+        "least error of a scale with fewer samples",
+        "derived: slopes of lines keep 0.67 of the fastest motions at seven samples a window; a wrong unit is farther off",
+    )
     filtered_scale: float = threshold(
         0.001,
         "-",

@@ -9,6 +9,7 @@ import numpy as np
 
 from ferryid.diagnose.checks.check import Check, Lasting, SensorFinding, rescaled
 from ferryid.diagnose.checks.kinematics import SCALE, SIZE, kinematics
+from ferryid.diagnose.checks.spans import least_off
 from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
@@ -25,7 +26,7 @@ UNITS = {
 def find(measurements: Measurements) -> SensorFinding | None:
     """Return the factor, measured over true, where speed over ground is not what positions give."""
     found = kinematics(measurements)
-    if found is None or not found.found(SCALE, CHECKS.least_scale):
+    if found is None or not found.found(SCALE, least_off(measurements.step_s, CHECKS.least_scale)):
         return None
     factor = found.solution.estimate(SCALE, "-")
     narrow = factor.high - factor.low < CHECKS.unit_width * factor.value

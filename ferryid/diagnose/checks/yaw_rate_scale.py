@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ferryid.diagnose.checks.check import Check, Lasting, SensorFinding, mapped, rescaled
-from ferryid.diagnose.checks.regression import Solution, independence, scatter, step
-from ferryid.diagnose.checks.spans import LENGTH_S, STRIDE_S, Spans, spans
+from ferryid.diagnose.checks.regression import Solution, independence, step
+from ferryid.diagnose.checks.spans import LENGTH_S, STRIDE_S, Spans, least_off, spans
 from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
@@ -23,8 +23,6 @@ from ferryid.vessel.profile import Profile
 
 OVERLAP = LENGTH_S / STRIDE_S
 """Windows that have one stretch of time in common: only every so many are independent."""
-PARTS = 4
-"""Parts of the log whose factors are compared."""
 NEUTRAL, SIZE = np.array([1.0, 0.0, 0.0]), np.array([2.0, 0.1, 2.0])
 """Factor, bias [rad/s] and delay [s] of a right gyro, and how large they may be."""
 
@@ -82,12 +80,7 @@ def compared(measurements: Measurements) -> Rates | None:
     other = _step(Z, J, measured, problem)
     if solved is None or other is None:
         return None
-    parts = [
-        _step(J[rows], J[rows], measured[rows], problem.only(rows))
-        for rows in np.array_split(np.arange(len(rate)), PARTS)
-    ]
-    errors = solved.errors * np.array([scatter(parts, 0), 1.0, 1.0])
-    return Rates(replace(solved, errors=errors), float(other.values[0]), problem.middle_s, rate, measured)
+    return Rates(solved, float(other.values[0]), problem.middle_s, rate, measured)
 
 
 def corrected(measurements: Measurements, factor: float) -> Measurements:
@@ -99,7 +92,8 @@ def corrected(measurements: Measurements, factor: float) -> Measurements:
 def find(measurements: Measurements) -> SensorFinding | None:
     """Return the factor of the yaw rate, measured over true."""
     rates = compared(measurements)
-    if rates is None or rates.off < CHECKS.least_rate_scale or not rates.solution.certain(0, 1.0):
+    least = least_off(measurements.step_s, CHECKS.least_rate_scale)
+    if rates is None or rates.off < least or not rates.solution.certain(0, 1.0):
         return None
     factor = rates.solution.estimate(0, "-")
     return SensorFinding(

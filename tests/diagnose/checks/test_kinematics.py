@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import savgol_filter
 
 from ferryid.diagnose.checks import kinematics, velocity_scale
 from ferryid.diagnose.checks.regression import Solution, scatter
-from ferryid.diagnose.checks.spans import spans_of
+from ferryid.diagnose.checks.spans import least_off, spans_of
+from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.effects.force_model import Measurements
 from ferryid.types import Floats
 from ferryid.vessel import load_profile
@@ -77,3 +80,15 @@ def test_parts_that_agree_do_not_widen_an_error_and_parts_that_do_not_do() -> No
     assert scatter(parts(1.0, 1.4, freedom=4), 0) == pytest.approx(np.sqrt(0.04 / 0.01), rel=0.01)
     assert scatter(parts(1.0, 1.4, freedom=3), 0) == 1.0
     assert scatter(parts(1.4), 0) == 1.0
+
+
+def test_few_samples_a_window_leave_wrong_units_alone() -> None:
+    assert least_off(0.1, 0.02) == least_off(1.0, 0.02) == 0.02
+    assert least_off(1.1, 0.02) == CHECKS.sparse_scale
+
+
+def test_a_slow_log_has_no_scale_that_its_samples_can_make() -> None:
+    fast = gauged(0.9, 0.9, 2)
+    assert velocity_scale.find(fast) is not None
+    every = ("t", "eta", "nu_raw", "nu", "parts", "angles", "usable")
+    assert velocity_scale.find(replace(fast, **{name: getattr(fast, name)[::11] for name in every})) is None
