@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ferryid.identify.feasible import Feasible
+from ferryid.identify.log_condition import KindOutcome, LogCondition
 from ferryid.identify.outcome import ArchivedLog, Excitation, LogFit, LogWind
 from ferryid.identify.settings import FitSettings
 from ferryid.models import ModelScores
@@ -169,6 +170,16 @@ class FitData(ABC):
     @property
     def winds(self) -> tuple[LogWind, ...]:
         """Steady winds of the logs in which nobody measured them."""
+        return ()
+
+    @property
+    def condition_kinds(self) -> tuple[KindOutcome, ...]:
+        """What spoke for each kind of condition that was considered besides wind."""
+        return ()
+
+    @property
+    def log_conditions(self) -> tuple[LogCondition, ...]:
+        """Conditions besides wind that the logs have of their own."""
         return ()
 
     def archived_logs(self, found: Coefficients) -> tuple[ArchivedLog, ...]:

@@ -10,7 +10,7 @@ been measured, and the hull's covariance keeps what that leaves uncertain.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -58,6 +58,8 @@ class Conditions:
         Wind load averaged over the training windows [N, N, N·m], (J, 3) each.
     added
         What the conditions add to the covariance of gains and intercept of the weak form, by axis, shape (3, K + 1, K + 1).
+    blown
+        The load as a function of the mean wind, of the logs whose wind is estimated, by their numbers.
     """
 
     wind: Floats
@@ -66,6 +68,7 @@ class Conditions:
     gust_mps: float
     load: tuple[Floats, ...]
     added: Floats
+    blown: Mapping[int, BlownLoad] = field(default_factory=dict)
 
     @classmethod
     def none(cls, windows: Sequence[WeakRows], K: int) -> Conditions:
@@ -94,6 +97,18 @@ class Conditions:
             replace(one, steady=one.steady - load) if load.any() else one
             for one, load in zip(windows, self.load, strict=True)
         )
+
+
+@dataclass(frozen=True, eq=False)
+class BlownLoad:
+    """Wind load of one log as a function of its mean wind, with the gusts that were found."""
+
+    load: _Load
+    gusts: Floats
+
+    def of(self, wind: Floats) -> Floats:
+        """Return the load beyond that of still air under a mean wind (2,), shape (J, 3)."""
+        return self.load.of(wind + self.gusts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,6 +259,7 @@ def estimate_conditions(
             for k, one in enumerate(windows)
         ),
         problem.added(),
+        {k: BlownLoad(load, problem.gusts.found[k]) for k, load in loads.items()},
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.identify.acceptance import Acceptance
+from ferryid.identify.log_condition import KindOutcome, LogCondition, conditions_json
 from ferryid.models import Model, ModelScores
 from ferryid.models.prediction import FreeRun
 from ferryid.signals.track import Motion
@@ -218,6 +219,10 @@ class FitOutcome:
         The logs of a fit to sums.
     winds
         Steady winds of single logs that nobody measured.
+    conditions
+        Conditions besides wind that single logs have of their own.
+    condition_kinds
+        What spoke for each kind of these that was considered.
     estimators
         How well either estimator predicts, where a fit chose between them.
     """
@@ -234,3 +239,9 @@ class FitOutcome:
     archive: tuple[ArchivedLog, ...] = ()
     estimators: tuple[EstimatorScore, ...] = ()
     winds: tuple[LogWind, ...] = ()
+    conditions: tuple[LogCondition, ...] = ()
+    condition_kinds: tuple[KindOutcome, ...] = ()
+
+    def conditions_by_log(self) -> list[dict[str, Any]]:
+        """Return wind and other conditions as plain values, one entry a log that has any."""
+        return conditions_json(self.winds, self.conditions)

@@ -27,10 +27,12 @@ from ferryid.identify.log_sums import folds_by_blocks, force_free_axes, sum_log
 from ferryid.identify.model_selection import Selection, select_model, windows_to_try
 from ferryid.identify.motion_data import LogData, compute_residuals, numbered_names
 from ferryid.identify.outcome import ComponentCurve, EstimatorScore, Excitation, FitOutcome
+from ferryid.identify.own_conditions import with_own_conditions
 from ferryid.identify.physical_checks import physical_checks
 from ferryid.identify.rows import basis_for
 from ferryid.identify.settings import TEST_WINDOW_S, FitSettings, check_components
 from ferryid.identify.split import Split, TooShort, split_rows
+from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.weak_data import WeakData, weak_data
 from ferryid.identify.window_length import with_best_length
 from ferryid.models import Model, ModelScores
@@ -164,6 +166,9 @@ def _choose_data(data: LogData, training: Sequence[Flags], opened: Sequence[Open
         components["derivative"] = int(wanted)
     if kind != "derivative":
         weak.refuse_contradictions()
+        if len(opened) >= IDENTIFY.fewest_condition_logs:
+            run.progress("estimating conditions of single logs")
+            weak = with_own_conditions(weak)
         components["weak"] = weak.components()
     if kind != "auto":
         return ChosenData(data if kind == "derivative" else weak, components[kind], why=why)
@@ -202,6 +207,8 @@ def accept_estimate(data: FitData, estimate: Estimate, name: str, run: RunContex
         logs=logs,
         archive=data.archived_logs(found),
         winds=data.winds,
+        conditions=data.log_conditions,
+        condition_kinds=data.condition_kinds,
     )
 
 

@@ -222,6 +222,24 @@ class IdentifyThresholds:
     gust_time_s: float = threshold(
         20.0, "s", "time constant of gusts", "convention: longer than a vessel's windows, shorter than a trial"
     )
+    fewest_condition_logs: int = threshold(
+        3, "logs", "from which conditions besides wind are estimated", "convention: two say nothing of a spread"
+    )
+    condition_evidence: float = threshold(
+        5.0,
+        "nat",
+        "logarithm of the marginal likelihood over that of none for which a kind of condition takes part",
+        "convention: strong evidence for one of five kinds",
+    )
+    condition_level: float = threshold(
+        0.05, "-", "probability by chance below which a condition of a log differs from none", "convention: 5 %"
+    )
+    trim_share: float = threshold(
+        0.05,
+        "of the root mean square",
+        "moderate offset of a velocity or yaw rate",
+        "convention: the unit of its spread, which is estimated",
+    )
     inertia_error: float = threshold(
         0.01,
         "of the inertia",

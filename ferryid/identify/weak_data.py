@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from math import isfinite
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -14,10 +14,13 @@ from ferryid.counts import counted
 from ferryid.effects.force_model import COEFFICIENTS, hull_of
 from ferryid.effects.hull_spread import default_hull_spread
 from ferryid.errors import FerryIdError
+from ferryid.identify.condition_estimation import OwnConditions, estimate_own
+from ferryid.identify.condition_problem import hull_and_conditions
 from ferryid.identify.contradictions import response_of, signs_of, wrong_size, wrong_way
 from ferryid.identify.feasible import Feasible, LiftTie, feasible_gains
 from ferryid.identify.fit_data import Estimate
 from ferryid.identify.inertia import relative_inertia, without_inertia
+from ferryid.identify.log_condition import KindOutcome, LogCondition, conditions_json
 from ferryid.identify.log_conditions import Conditions, LoadSamples, estimate_conditions, sample_load
 from ferryid.identify.motion_data import LogData
 from ferryid.identify.outcome import Excitation, LogWind
@@ -84,9 +87,15 @@ class WeakData(LogData):
     ----------
     training_s
         Length of the training windows [s]; None: that of the windows in which models are judged.
+    own_spreads
+        Of the kinds of conditions, besides wind, that logs have of their own, the spread between logs in sizes.
+    own_kinds
+        What spoke for each kind that was considered.
     """
 
     training_s: float | None = field(default=None, kw_only=True)
+    own_spreads: Mapping[str, float] = field(default_factory=dict, kw_only=True)
+    own_kinds: tuple[KindOutcome, ...] = field(default=(), kw_only=True)
 
     @cached_property
     def windows(self) -> PredictionWindows:
@@ -120,7 +129,55 @@ class WeakData(LogData):
         """
         if why := self.impossible:
             raise FerryIdError(f"{self.where}: {why}. Fix: give more or longer logs, or use --estimator derivative")
+        return self._blown if self.own is None else self.own.windows
+
+    @cached_property
+    def _blown(self) -> tuple[WeakRows, ...]:
+        """Training windows as if the wind had been measured."""
         return self.conditions.applied(self.windows.training)
+
+    @cached_property
+    def own(self) -> OwnConditions | None:
+        """Conditions that logs have of their own besides wind; None where there are none."""
+        if not self.own_spreads:
+            return None
+        return estimate_own(hull_and_conditions(self.having({}), self.own_spreads), self.own_spreads)
+
+    def having(self, spreads: Mapping[str, float], kinds: tuple[KindOutcome, ...] = ()) -> Self:
+        """Return the same data with these kinds of conditions, spreads to begin with, and what spoke for each kind."""
+        other = replace(self, own_spreads=spreads, own_kinds=kinds)
+        # What depends on the windows as measured stays as it is, and all else where the conditions do.
+        kept = ("windows", "conditions", "_posed", "_blown") if spreads != self.own_spreads else tuple(self.__dict__)
+        for name in kept:
+            if name in self.__dict__ and name not in other.__dataclass_fields__:
+                other.__dict__[name] = self.__dict__[name]
+        return other
+
+    @property
+    def winds(self) -> tuple[LogWind, ...]:
+        """Steady winds of the logs in which nobody measured them."""
+        return self.conditions.listed(self.log_names) if self.own is None else self.own.winds(self.log_names)
+
+    @property
+    def condition_kinds(self) -> tuple[KindOutcome, ...]:
+        """What spoke for each kind of condition that was considered besides wind."""
+        return self.own_kinds
+
+    @property
+    def log_conditions(self) -> tuple[LogCondition, ...]:
+        """Conditions besides wind that the logs have of their own."""
+        return () if self.own is None else self.own.listed(self.log_names)
+
+    def training_logs(self) -> tuple[Mapping[str, Any], ...]:
+        """Return the training logs as a model file lists them, with the conditions that were estimated."""
+        found = {one.pop("log"): {"conditions": one} for one in conditions_json(self.winds, self.log_conditions)}
+        logs = zip(self.log_names, super().training_logs(), strict=True)
+        return tuple({**one, **found.get(name, {})} for name, one in logs)
+
+    @property
+    def condition_covariance(self) -> Floats:
+        """What conditions of single logs add to the covariance of gains and intercept, by axis, shape (3, K + 1, K + 1)."""
+        return self.conditions.added if self.own is None else self.conditions.added + self.own.added
 
     @cached_property
     def conditions(self) -> Conditions:
@@ -159,11 +216,6 @@ class WeakData(LogData):
     def log_names(self) -> tuple[str, ...]:
         """Names of the logs."""
         return tuple(motion.log for motion in self.motions)
-
-    @property
-    def winds(self) -> tuple[LogWind, ...]:
-        """Steady winds of the logs in which nobody measured them."""
-        return self.conditions.listed(self.log_names)
 
     @property
     def impossible(self) -> str:
@@ -443,7 +495,7 @@ class WeakData(LogData):
             pulls = rng.standard_normal((len(gains), len(own))) / spread
             out[:, every, axis] += pulls @ covariance[np.searchsorted(every, own)]
             out[:, every, axis] += rng.standard_normal((len(gains), len(every))) @ _root(
-                self.conditions.added[axis][np.ix_(every, every)]
+                self.condition_covariance[axis][np.ix_(every, every)]
             )
             own_inertia = ACCELERATIONS[axis]
             if (
@@ -505,7 +557,7 @@ class WeakData(LogData):
         K = len(self.functions.terms)
         found = self.whitened.mean[K:] - np.einsum("k,...ka->...a", self.whitened.mean[:K], gains)
         found = found + offsets / self.whitened.unit
-        chance = self.whitening.sigma**2 / max(self.whitened.weight, 1e-12) + self.conditions.added[:, K, K]
+        chance = self.whitening.sigma**2 / max(self.whitened.weight, 1e-12) + self.condition_covariance[:, K, K]
         return np.asarray(found * np.maximum(0.0, 1.0 - chance / np.maximum(found**2, np.finfo(np.float64).tiny)))
 
     def fitted(self, regression: Simpls) -> tuple[Floats, Floats]:

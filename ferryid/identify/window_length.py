@@ -68,7 +68,7 @@ def prediction_scatter(data: WeakData, at: Floats) -> Floats:
         covariance = np.linalg.pinv(information[axis][np.ix_(own, own)], hermitian=True)
         spread = data.prior_factor * data.prior_spread[own, axis]
         determined = float(own.sum()) - float(np.diag(covariance) @ np.where(np.isfinite(spread), spread**-2.0, 0.0))
-        covariance = covariance + data.conditions.added[axis][:-1, :-1][np.ix_(own, own)]
+        covariance = covariance + data.condition_covariance[axis][:-1, :-1][np.ix_(own, own)]
         variance = float(np.mean(np.einsum("nk,kl,nl->n", at[:, own], covariance, at[:, own])))
         free = windows - determined
         out[axis] = np.sqrt(variance * windows / free) if free >= 1.0 and sigma[axis] > 0.0 else np.inf

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from ferryid.regression.nipals import component_covariances, fit_nipals
     from ferryid.regression.pca import principal_components
     from ferryid.regression.qr import QrFactor, factorise
+    from ferryid.regression.random_effects import GroupSums, MixedFit
     from ferryid.regression.simpls import Simpls, fit_simpls, total
     from ferryid.regression.test_function import STRIDES, window_rows, window_starts, window_sums, window_weights
     from ferryid.regression.thresholds import REGRESSION
@@ -24,6 +25,8 @@ __all__ = [
     "REGRESSION",
     "STRIDES",
     "CrossProducts",
+    "GroupSums",
+    "MixedFit",
     "QrFactor",
     "Rows",
     "Simpls",
@@ -62,6 +65,10 @@ __getattr__ = import_on_demand(
         "qr": (
             "QrFactor",
             "factorise",
+        ),
+        "random_effects": (
+            "GroupSums",
+            "MixedFit",
         ),
         "simpls": (
             "Simpls",

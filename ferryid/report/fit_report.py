@@ -163,7 +163,8 @@ def as_json(result: FitOutcome, stored: StoredModel, report: Path | None) -> dic
         "logs": [{"name": log.motion.log, **log.data_quality} for log in result.logs],
         **({"archive": [log.to_json() for log in result.archive]} if result.archive else {}),
         **({"estimators": [one.to_json() for one in result.estimators]} if result.estimators else {}),
-        **({"conditions": [one.to_json() for one in result.winds]} if result.winds else {}),
+        **({"conditions": conditions} if (conditions := result.conditions_by_log()) else {}),
+        **({"condition_kinds": [one.to_json() for one in result.condition_kinds]} if result.condition_kinds else {}),
         "report": None if report is None else str(report),
     }
 
@@ -196,7 +197,8 @@ def as_text(result: FitOutcome, stored: StoredModel, report: Path | None) -> str
             f"{'' if one.possible else '; no hull has such inertia or damping'}{'; chosen' if one.chosen else ''}"
         )
     lines.extend(f"wind, estimated: {one}" for one in result.winds)
-    lines.extend([""] if result.estimators or result.winds else [])
+    lines.extend(f"{one.title}, estimated: {one}" for one in result.conditions)
+    lines.extend([""] if result.estimators or result.winds or result.conditions else [])
     lines.extend(f"warning: {warning}" for warning in result.warnings)
     state = "current" if stored.current else ("stored" if model.accepted else "stored, marked as rejected")
     if stored.current and stored.previous not in (None, model.version):

@@ -111,6 +111,8 @@ def _context(result: FitOutcome, interactive: Interactive) -> dict[str, Any]:
             for one in result.estimators
         ],
         "winds": [str(one) for one in result.winds],
+        "conditions": [f"{one.title}, {one}" for one in result.conditions],
+        "condition_kinds": [str(one) for one in result.condition_kinds],
         "checks": [
             {"name": check.name.replace("_", " "), "holds": _HOLDS[check.passed], "reason": check.reason}
             for check in verdict.checks
