@@ -15,6 +15,7 @@ from ferryid.identify.condition_kinds import WIND, ConditionKind, gain_matrix
 from ferryid.identify.condition_problem import STEADY, HullAndConditions
 from ferryid.identify.log_condition import LogCondition
 from ferryid.identify.outcome import LogWind
+from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.weak_rows import WeakRows
 from ferryid.regression import GroupSums, MixedFit
 from ferryid.types import Floats, Ints
@@ -125,7 +126,9 @@ def estimate_own(problem: HullAndConditions, spreads: Mapping[str, float]) -> Ow
     kinds, covariance = [kind for kind in problem.kinds if kind.id in chosen.spreads], {}
     for kind in kinds:
         rows = chosen.rows(problem, kind)
-        covariance[kind.id] = chosen.fit.own_covariance[:, rows[:, None], rows] * np.outer(kind.sizes, kind.sizes)
+        wider = 1.0 if kind.id == WIND else IDENTIFY.condition_error
+        scale = wider**2 * np.outer(kind.sizes, kind.sizes)
+        covariance[kind.id] = chosen.fit.own_covariance[:, rows[:, None], rows] * scale
     return OwnConditions(
         tuple(kinds),
         {kind.id: chosen.spreads[kind.id] for kind in kinds},

@@ -226,10 +226,16 @@ class IdentifyThresholds:
         3, "logs", "from which conditions besides wind are estimated", "convention: two say nothing of a spread"
     )
     condition_evidence: float = threshold(
-        5.0,
+        8.0,
         "nat",
         "logarithm of the marginal likelihood over that of none for which a kind of condition takes part",
-        "convention: strong evidence for one of five kinds",
+        "convention: as for an effect in a diagnosis",
+    )
+    condition_error: float = threshold(
+        1.5,
+        "-",
+        "factor on standard errors of conditions, as measured velocity and heading are taken as exact in products",
+        "convention: as for an effect in a diagnosis",
     )
     condition_level: float = threshold(
         0.05, "-", "probability by chance below which a condition of a log differs from none", "convention: 5 %"
