@@ -149,7 +149,7 @@ def _absent(profile: Profile, motion: Motion, windows: WeakRows) -> dict[str, st
     if motion.payload is not None:
         absent["payload"] = "it was measured"
     elif not profile.hull.is_known:
-        absent["payload"] = "the profile has no hull model, and its mass is estimated from the same logs"
+        absent["payload"] = f"{profile.hull.why_unknown}, and its mass comes from the same logs"
     return absent
 
 
@@ -197,7 +197,7 @@ class ChangedWindows:
     def _functions(self, nu: Floats) -> Floats:
         flat = nu.reshape(-1, 3)
         values = self.functions.evaluate(flat, np.zeros_like(flat), *self._flows)
-        return np.asarray(np.einsum("jsk,s->jk", values.reshape(*nu.shape[:2], -1), self.samples.weight))
+        return np.asarray(np.einsum("jsk,s->jk", values.reshape(*nu.shape[:2], values.shape[1]), self.samples.weight))
 
     def _steady(self, nu: Floats, psi: Floats, current: Floats) -> Floats:
         flat = nu.reshape(-1, 3)

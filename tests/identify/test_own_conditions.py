@@ -63,7 +63,7 @@ def log_of(kind: str, value: Floats, seed: int) -> Measured:
         angle = np.radians(value[0])
         c, s = np.cos(angle), np.sin(angle)
         nu[:, 0], nu[:, 1] = c * one.nu[:, 0] + s * one.nu[:, 1], c * one.nu[:, 1] - s * one.nu[:, 0]
-        eta = eta + [0.0, 0.0, angle]
+        eta = eta + np.array([0.0, 0.0, angle])
     return replace(one, nu=nu, eta=eta)
 
 
@@ -142,7 +142,7 @@ def test_logs_without_anything_of_their_own_have_none_and_two_logs_are_not_asked
 
 def test_kinds_that_logs_cannot_show_are_left_out_with_the_reason() -> None:
     logs = [measured(k, seconds=SECONDS) for k in range(3)]
-    in_tank = replace(PROFILE, setting="tank", hull=replace(PROFILE.hull, source="rigid body"))
+    in_tank = replace(PROFILE, setting="tank", hull=replace(PROFILE.hull, D=type(PROFILE.hull.D)()))
     assert not in_tank.hull.is_known
     told = {one.kind: one for one in with_own_conditions(data_of(logs, in_tank)).condition_kinds}
     assert told["current"].reason == "the profile's setting is a tank"
@@ -173,7 +173,9 @@ def test_a_condition_acts_on_windows_as_one_that_was_measured() -> None:
     second[2, 2] = 100.0 * 0.5**2
     np.testing.assert_allclose(found.inertia + second, aboard.inertia)
     turned = log.under({"heading_bias": np.array([90.0])}, np.eye(3))
-    np.testing.assert_allclose(turned.by_velocity[:, :2], np.column_stack([-plain.by_velocity[:, 1], plain.by_velocity[:, 0]]))
+    np.testing.assert_allclose(
+        turned.by_velocity[:, :2], np.column_stack([-plain.by_velocity[:, 1], plain.by_velocity[:, 0]])
+    )
 
 
 def test_the_estimate_of_folds_is_made_anew_and_windows_are_kept() -> None:
@@ -212,7 +214,9 @@ def test_intervals_of_the_hull_are_wider_by_what_conditions_leave_open() -> None
 
 
 def test_conditions_are_worded_and_kept_by_log() -> None:
-    one = LogCondition("a", "current", "current", ("north", "east"), ("m/s", "m/s"), np.array([0.2, -0.1]), 1e-4 * np.eye(2))
+    one = LogCondition(
+        "a", "current", "current", ("north", "east"), ("m/s", "m/s"), np.array([0.2, -0.1]), 1e-4 * np.eye(2)
+    )
     assert str(one) == "a: north 0.2 (0.18 to 0.22) m/s, east -0.1 (-0.12 to -0.0804) m/s"
     none = replace(one, values=np.array([0.01, 0.0]))
     assert str(none) == "a: not distinguishable from zero"

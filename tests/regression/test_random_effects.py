@@ -65,7 +65,9 @@ def test_the_spread_of_greatest_evidence_is_that_of_the_groups(spread: float) ->
     sums, _ = drawn(40, 30, spread)
     found, fit = sums.best(lambda size: np.full(D, size))
     assert found == pytest.approx(spread, abs=0.12)
-    assert fit.evidence == max(fit.evidence, *(sums.fit(np.full(D, size)).evidence for size in (0.01, 0.3, 0.6, 1.0, 3.0)))
+    assert fit.evidence == max(
+        fit.evidence, *(sums.fit(np.full(D, size)).evidence for size in (0.01, 0.3, 0.6, 1.0, 3.0))
+    )
     # Where groups have nothing of their own, none is as likely.
     none = sums.within(np.zeros(0, dtype=np.int64)).fit(np.zeros(0)).evidence
     assert (fit.evidence - none > 100.0) == (spread > 0.0)

@@ -17,6 +17,7 @@ from ferryid.identify.estimators import choose_estimator
 from ferryid.identify.fit_data import Coefficients
 from ferryid.identify.log_sums import folds_by_blocks, force_free_axes, sum_log
 from ferryid.identify.model_selection import select_model
+from ferryid.identify.own_conditions import with_own_conditions
 from ferryid.identify.weak_data import weak_data
 from ferryid.identify.weak_rows import to_force
 from ferryid.identify.window_length import with_best_length
@@ -43,7 +44,7 @@ def base(task: Task, draws: int) -> Coefficients:
 
 def weak(task: Task, draws: int) -> Coefficients:
     """Return what ``ferryid fit --estimator weak`` finds."""
-    data = with_best_length(weak_data(task.data))
+    data = with_own_conditions(with_best_length(weak_data(task.data)))
     return estimate_correction(data, data.components(), draws, no_progress).coefficients
 
 
@@ -54,7 +55,7 @@ def derivative(task: Task, draws: int) -> Coefficients:
 
 def auto(task: Task, draws: int) -> Coefficients:
     """Return what ``ferryid fit`` finds: by the possible one of its estimators that errs less on folds of the training rows."""
-    data = with_best_length(weak_data(task.data))
+    data = with_own_conditions(with_best_length(weak_data(task.data)))
     components = {"weak": data.components(), "derivative": _derivative_components(task)}
     chosen, scores = choose_estimator(task.data, data, components)
     (name,) = (one.name for one in scores if one.chosen)
