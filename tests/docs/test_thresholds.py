@@ -140,9 +140,12 @@ NO_DECISION = {
         effects.wind SPEEDS_MPS BEARINGS MEAN_WEIGHTS
         identify.feasible _ROUNDS _SHARES _DIRECTIONS _TIE_STEPS
         identify.log_conditions _DIRECTIONS _SPEEDS _STEP_MPS
+        identify.condition_estimation STEPS _FIRST_STEADY
+        identify.condition_kinds _STEP
         identify.settings WINDOWS_S
         models.forces.residual _PASSES
         regression.nipals MOST_ITERATIONS
+        regression.random_effects _GOLDEN _REFINEMENTS _RIDGE _SPREADS
     """,
     "sizes: rows held at once, draws, folds, bins, and how much is shown": """
         signals.copies SAMPLES ROWS TRIED
@@ -173,6 +176,9 @@ NO_DECISION = {
         identify.gusts _PROBES MANY_WINDOWS
         identify.weak_archive _AT_A_TIME
         identify.log_conditions _SAMPLES _START_WINDOWS
+        identify.condition_choice _GROUPS
+        identify.condition_kinds _POINTS
+        identify.condition_problem BLOCKS STEADY
         identify.physical_checks MOST_ROWS
         identify.settings FOLDS
         identify.split EVERY
