@@ -37,7 +37,7 @@ def _outcome(test: KindTest) -> KindOutcome:
         (one.name, test.spread * size, one.unit)
         for one, size in zip(test.kind.parameters, test.kind.sizes.tolist(), strict=True)
     )
-    told = f"its evidence over none is {test.evidence:.1f} nat"
+    told = f"its evidence over none is {max(test.evidence, 0.0):.1f} nat"
     if test.included:
         reason = f"{told}, and held-out stretches are predicted no worse with it"
     elif test.evidence < IDENTIFY.condition_evidence:

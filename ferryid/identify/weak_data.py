@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from math import isfinite
@@ -170,8 +170,11 @@ class WeakData(LogData):
 
     def training_logs(self) -> tuple[Mapping[str, Any], ...]:
         """Return the training logs as a model file lists them, with the conditions that were estimated."""
+        return self.with_conditions(zip(self.log_names, super().training_logs(), strict=True))
+
+    def with_conditions(self, logs: Iterable[tuple[str, Mapping[str, Any]]]) -> tuple[Mapping[str, Any], ...]:
+        """Return entries of logs, by the log's name, with the conditions that were estimated."""
         found = {one.pop("log"): {"conditions": one} for one in conditions_json(self.winds, self.log_conditions)}
-        logs = zip(self.log_names, super().training_logs(), strict=True)
         return tuple({**one, **found.get(name, {})} for name, one in logs)
 
     @property

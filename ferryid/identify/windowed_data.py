@@ -231,14 +231,17 @@ class WindowedData(WeakData):
 
     def training_logs(self) -> tuple[Mapping[str, Any], ...]:
         """Return the training logs as a model file lists them."""
-        return tuple(
-            {
-                "name": log.name,
-                "files": list(log.files),
-                "sha256": log.sha256,
-                "seconds": part.rows / log.rate_hz,
-                "rows": part.rows,
-            }
+        return self.with_conditions(
+            (
+                log.name,
+                {
+                    "name": log.name,
+                    "files": list(log.files),
+                    "sha256": log.sha256,
+                    "seconds": part.rows / log.rate_hz,
+                    "rows": part.rows,
+                },
+            )
             for log, part in zip(self.logs, self.trained, strict=True)
             if part.rows
         )

@@ -227,3 +227,15 @@ def test_conditions_are_worded_and_kept_by_log() -> None:
     told = KindOutcome("current", "current", False, "no heading was measured")
     assert str(told) == "current: not estimated, as no heading was measured"
     assert told.to_json()["evidence"] is None
+
+
+def test_the_list_of_training_logs_has_what_was_estimated_of_each() -> None:
+    data, _ = campaign("current")
+    after = with_own_conditions(data)
+    names = after.log_names
+    entries = after.with_conditions([(name, {"name": name, "rows": 7}) for name in names])
+    assert [one["name"] for one in entries] == list(names)
+    for one, found in zip(entries, after.log_conditions, strict=True):
+        assert list(one["conditions"]) == ["wind", "current"]
+        assert one["conditions"]["current"] == found.to_json()
+    assert after.with_conditions([("another", {"rows": 7})]) == ({"rows": 7},)
