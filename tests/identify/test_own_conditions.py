@@ -172,7 +172,20 @@ def test_a_condition_acts_on_windows_as_one_that_was_measured() -> None:
     second = np.zeros((3, 3))
     second[2, 2] = 100.0 * 0.5**2
     np.testing.assert_allclose(found.inertia + second, aboard.inertia)
-    turned = log.under({"heading_bias": np.array([90.0])}, np.eye(3))
+    known = replace(
+        made, eta=made.eta - [0.0, 0.0, np.pi / 2.0], nu=made.nu @ [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+    )
+    right = average_over_windows(known, rows, PROFILE, SCALE, BASIS, 8.0)
+    of_known = ChangedWindows(
+        PROFILE, SCALE, BASIS, right, MotionSamples.of(PROFILE, known, known.nu, right, 8.0), np.zeros(3, dtype=bool)
+    )
+    turned, straight = (
+        log.under({"heading_bias": np.array([90.0]), "current": flow}, np.eye(3)),
+        of_known.under({"current": flow}, np.eye(3)),
+    )
+    np.testing.assert_allclose(turned.heading, straight.heading, atol=1e-9)
+    size = np.abs(straight.steady - right.steady).max(axis=0)
+    np.testing.assert_allclose(turned.steady / size, straight.steady / size, atol=0.2)
     np.testing.assert_allclose(
         turned.by_velocity[:, :2], np.column_stack([-plain.by_velocity[:, 1], plain.by_velocity[:, 0]])
     )
