@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import html
+import json
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
+from importlib.resources import files
 from math import inf
 from pathlib import Path
 
+import jsonschema
+import numpy as np
 import pytest
 
+from ferryid.identify.log_condition import KindOutcome, LogCondition
 from ferryid.identify.outcome import EstimatorScore, FitOutcome
 from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.settings import FitSettings
 from ferryid.models.store.versions import StoredModel
-from ferryid.report.fit_report import as_text
+from ferryid.report.fit_report import as_json, as_text
 from ferryid.report.headline import headline_of
 from ferryid.report.page import _held, render
 from ferryid.types import RunContext
@@ -101,6 +106,37 @@ def test_an_estimator_without_a_model_on_the_folds_is_said_to_be_without_one(
         in told
     )
     assert "model's: 0.063 on folds of the training rows, 0.212 held out; chosen" in told
+
+
+def test_conditions_of_single_logs_stand_on_the_page_in_the_text_and_in_the_json(
+    result: FitOutcome, tmp_path: Path
+) -> None:
+    current = LogCondition(
+        "monday", "current", "current", ("north", "east"), ("m/s", "m/s"), np.array([0.2, -0.1]), 1e-4 * np.eye(2)
+    )
+    found = replace(
+        result,
+        conditions=(current, replace(current, log="tuesday", values=np.zeros(2))),
+        condition_kinds=(
+            KindOutcome(
+                "current", "current", True, "its evidence over none is 20.0 nat", (("north", 0.1, "m/s"),), 20.0
+            ),
+            KindOutcome("payload", "load", False, "the profile has no hull model"),
+        ),
+    )
+    page = html.unescape(render(found)[0])
+    assert "<li>current, monday: north 0.2 (0.18 to 0.22) m/s" in page
+    assert "<li>load: not estimated, as the profile has no hull model</li>" in page
+    assert "Other conditions of single logs" not in render(result)[0]
+    stored = StoredModel(tmp_path / "1.json", found.model, current=False)
+    lines = as_text(found, stored, None).splitlines()
+    assert "current, estimated: monday: north 0.2 (0.18 to 0.22) m/s, east -0.1 (-0.12 to -0.0804) m/s" in lines
+    assert "current, estimated: tuesday: not distinguishable from zero" in lines
+    plain = json.loads(json.dumps(as_json(found, stored, None)))
+    schema = json.loads(files("ferryid.schemas").joinpath("fit.json").read_text(encoding="utf-8"))
+    jsonschema.validate(plain["conditions"], schema["properties"]["conditions"])
+    jsonschema.validate(plain["condition_kinds"], schema["properties"]["condition_kinds"])
+    assert [one["included"] for one in plain["condition_kinds"]] == [True, False]
 
 
 def test_names_of_logs_and_warnings_are_escaped(result: FitOutcome) -> None:
