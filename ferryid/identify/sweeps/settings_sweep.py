@@ -253,8 +253,8 @@ def _sweep_derivative(request: _Request) -> Sweep:
         windows, functions, free, cuts, told = _from_logs(request.opened, profile, settings, run, fixed, request.folds)
     if what != "components" and len(windows) < 2:
         raise FerryIdError(
-            f"{told[0]['name']}: nothing to compare, as all windows come to {windows[0]:g} s at this log's rate. "
-            "Fix: give --windows that are apart, or a higher --rate"
+            f"{told[0]['name']}: nothing to compare, as every window given is {windows[0]:g} s, rounded to samples of this "
+            "log. Fix: give --windows that are apart, or a higher --rate"
         )
     run.progress("cross-validating")
     by = {
