@@ -69,7 +69,7 @@ def windows_to_try(
     With `in_blocks` those, too, that leave no log with blocks to train and blocks to validate on do not suit.
     """
     for window_s in windows_s:
-        check_window(window_s)
+        check_window(window_s, "--windows")
     if tuple(windows_s) in ((), WINDOWS_S):
         longest_s = min(longest_stretch_s(one) for one in measured) / IDENTIFY.window_stretches
         windows_s = [w for w in WINDOWS_S if w <= longest_s]

@@ -118,8 +118,9 @@ class FitSettings:
                     f"--components: {text!r} is not a number of components. Fix: give 1 or more, or auto"
                 )
             object.__setattr__(self, "components", int(text))
-        for window_s in (self.window_s, *self.windows_s):
-            check_window(window_s)
+        check_window(self.window_s)
+        for window_s in self.windows_s:
+            check_window(window_s, "--windows")
         if self.windows_s and self.smoother == "kalman":
             raise FerryIdError(
                 "--window auto: the Kalman smoother finds its window by likelihood. Fix: give one window, which it keeps to at "
@@ -187,11 +188,11 @@ def check_components(components: str | int, functions: Basis) -> None:
         )
 
 
-def check_window(window_s: float | None) -> None:
+def check_window(window_s: float | None, option: str = "--window") -> None:
     """Refuse what is no smoothing window; None stands for a default."""
     if window_s is not None and window_s != 0.0 and not IDENTIFY.shortest_window_s <= window_s <= 60.0:
         raise FerryIdError(
-            f"--window: {window_s} s is no smoothing window. "
+            f"{option}: {window_s} s is no smoothing window. "
             f"Fix: give {IDENTIFY.shortest_window_s:g} to 60 s, 1.0 is usual, or 0 for none"
         )
 

@@ -154,7 +154,7 @@ def test_settings_that_cannot_be(ferryid, fixtures: Path, tmp_path: Path, option
         ("bases", (), 'Did you mean "basis"'),
         ("window", ("--windows", "a,b"), "'a' is no number of seconds"),
         ("both", ("--windows=-1,2",), "-1.0 s is no smoothing window"),
-        ("both", ("--windows", "1,1e9"), "1000000000.0 s is no smoothing window"),
+        ("both", ("--windows", "1,1e9"), "--windows: 1000000000.0 s is no smoothing window"),
         ("window", ("--windows", "1"), "nothing to compare"),
         ("window", ("--smoother", "kalman"), "Kalman"),
         ("components", ("--windows", "1,2"), "at one window"),

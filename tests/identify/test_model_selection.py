@@ -144,7 +144,7 @@ def test_usual_windows_are_tried_where_the_log_is_ten_times_as_long() -> None:
     assert windows_to_try((), [long]) == windows_to_try(WINDOWS_S, [long]) == WINDOWS_S
     assert windows_to_try((), [long, short]) == tuple(one for one in WINDOWS_S if one <= 2.0)
     assert windows_to_try((5.0, 1.0), [short]) == (1.0, 5.0)
-    with pytest.raises(FerryIdError, match=r"--window: 61\.0 s is no smoothing window"):
+    with pytest.raises(FerryIdError, match=r"--windows: 61\.0 s is no smoothing window"):
         windows_to_try((1.0, 61.0), [long])
 
 
