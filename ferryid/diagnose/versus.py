@@ -163,7 +163,7 @@ def _resolved(path: str) -> Path:
 def _group_log(log: AveragedLog) -> GroupLog:
     t = log.screened.measurements.t
     sensors = tuple(one.effect for one in log.screened.sensors)
-    name = log.screened.measured.survey.motion.log
+    name = log.screened.measured.survey.used.log
     return GroupLog(name, log.path, float(t[-1] - t[0]), len(log.windows.starts), sensors)
 
 

@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from ferryid.identify.settings import FitSettings
 from ferryid.signals.copies import GivenLogs
 from ferryid.signals.prepare import Opened, open_track
+from ferryid.signals.stream import compact
 from ferryid.types import RunContext
 from ferryid.vessel.profile import Profile
 
 
-def read_logs(paths: Sequence[str], profile: Profile, settings: FitSettings, run: RunContext) -> list[Opened]:
+def read_logs(
+    paths: Sequence[str], profile: Profile, settings: FitSettings, run: RunContext, *, whole: bool = True
+) -> list[Opened]:
     """Read several logs and align their signals, before smoothing.
+
+    With `whole` False, their recordings are `compact`, which leaves a third of the memory where nobody asks for the quality of
+    their signals.
 
     Raises
     ------
@@ -25,5 +32,5 @@ def read_logs(paths: Sequence[str], profile: Profile, settings: FitSettings, run
         run.progress(f"reading {Path(path).name}")
         one = open_track(path, profile, run.tables, rate_hz=settings.rate_hz, verify=run.verify, ranges=run.ranges)
         given.add(one.recording)
-        opened.append(one)
+        opened.append(one if whole else replace(one, recording=compact(one.recording)))
     return opened

@@ -254,7 +254,9 @@ def compute_residuals(
     functions = basis_for(settings, motions)
     check_components(settings.components, functions)
     targets = [compute_residual(profile, motion, settings.scale, settings.residual) for motion in motions]
-    errors = [compute_residual(profile, motion, settings.scale) for motion in motions]
+    errors = targets
+    if settings.residual != "measured":
+        errors = [compute_residual(profile, motion, settings.scale) for motion in motions]
     if settings.reduced:
         for residual in (*targets, *errors):
             residual[:, 1] = 0.0

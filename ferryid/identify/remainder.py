@@ -14,7 +14,6 @@ import numpy as np
 
 from ferryid.effects.measurements import interpolate_gaps
 from ferryid.errors import FerryIdError
-from ferryid.identify.inputs import read_logs
 from ferryid.identify.outcome import FitOutcome
 from ferryid.identify.pipeline import fit_opened
 from ferryid.identify.rows import basis_for
@@ -38,7 +37,7 @@ from ferryid.vessel.profile import Profile
 
 
 def fit_remainder(
-    model: Model, paths: Sequence[str], profile: Profile, settings: FitSettings, run: RunContext
+    model: Model, opened: Sequence[Opened], profile: Profile, settings: FitSettings, run: RunContext
 ) -> FitOutcome:
     """Fit a correction of a model to logs, and judge it against that model on rows that it did not see.
 
@@ -46,7 +45,9 @@ def fit_remainder(
     ----------
     model
         The model that takes the place of the base model. A log whose conditions it knows is taken with these.
-    paths, profile, settings, run
+    opened
+        Logs that were read and aligned.
+    profile, settings, run
         As of `ferryid.identify.fit_logs`; terms and smoothing are those of the model where it has terms.
 
     Returns
@@ -60,9 +61,7 @@ def fit_remainder(
         For input that cannot be used, with file, cause and remedy.
     """
     settings = _settings_of(model, settings).on(profile)
-    opened = read_logs(paths, profile, settings, run)
-    motions = [smoothed(one, settings.window_s, settings.smoother).motion for one in opened]
-    start = _with_terms(model, basis_for(settings, motions))
+    start = _with_terms(model, basis_for(settings, [one.measured for one in opened]))
     hull = replace_hull_coefficients(profile.hull, ModelForces(start).altered_hull())
     # The load of the wind is among the forces that are taken off.
     bare = replace(profile, hull=hull, wind=None)
@@ -109,10 +108,9 @@ def with_remainder(model: Model, remainder: Model) -> Model:
 
 def prediction_errors(
     models: Sequence[Model],
-    paths: Sequence[str],
+    opened: Sequence[Opened],
     profile: Profile,
     settings: FitSettings,
-    run: RunContext,
     rows: Sequence[Flags],
 ) -> list[Floats]:
     """Return how well models predict the acceleration of logs, averaged over windows, as force on the profile's mass.
@@ -121,7 +119,9 @@ def prediction_errors(
     ----------
     models
         Stored models of any kind; each sees a log with the effects that it knows.
-    paths, profile, settings, run
+    opened
+        Logs that were read and aligned.
+    profile, settings
         As of `ferryid.identify.fit_logs`.
     rows
         Rows of each log, shape (n,), whose windows count.
@@ -134,8 +134,8 @@ def prediction_errors(
     mass = effective_mass(profile, settings.scale, (), np.zeros((0, 3)))
     length_s = settings.weak_window_s or window_seconds(profile)
     squares = [[np.zeros((0, 3))] for _ in models]
-    for opened, wanted in zip(read_logs(paths, profile, settings, run), rows, strict=True):
-        prepared = smoothed(opened, settings.window_s, settings.smoother, keep_track=True)
+    for one, wanted in zip(opened, rows, strict=True):
+        prepared = smoothed(one, settings.window_s, settings.smoother, keep_track=True)
         found = [
             predict(model, prepared, profile, window_s=settings.window_s, smoother=settings.smoother)
             for model in models

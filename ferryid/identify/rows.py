@@ -12,12 +12,12 @@ from ferryid.identify.settings import FitSettings
 from ferryid.models import usable_rows
 from ferryid.regression import Rows
 from ferryid.regression.bases import SWAY, Basis, make_basis, relative_flow
-from ferryid.signals.smooth import odd_rows
+from ferryid.signals.smooth import Measured, odd_rows
 from ferryid.signals.track import Motion
 from ferryid.types import Flags, Floats
 
 
-def basis_for(settings: FitSettings, motions: Sequence[Motion]) -> Basis:
+def basis_for(settings: FitSettings, motions: Sequence[Motion | Measured]) -> Basis:
     """Return the basis of the settings; wind and current join it when every log has them, unless the name says how.
 
     Its mask is without sway where that is not measured.
@@ -26,7 +26,7 @@ def basis_for(settings: FitSettings, motions: Sequence[Motion]) -> Basis:
     return functions.without((SWAY,)) if settings.reduced else functions
 
 
-def _full_basis(settings: FitSettings, motions: Sequence[Motion]) -> Basis:
+def _full_basis(settings: FitSettings, motions: Sequence[Motion | Measured]) -> Basis:
     if "+" in settings.basis:
         return make_basis(settings.basis, structure=settings.structure)
     wind = "thesis" if all(motion.wind is not None for motion in motions) else None

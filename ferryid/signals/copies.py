@@ -6,6 +6,9 @@ recording all the same: it would train and validate on the same data, and count 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +16,7 @@ import numpy as np
 from ferryid.errors import FerryIdError
 from ferryid.signals.stream import Recording
 from ferryid.signals.thresholds import SIGNALS
-from ferryid.types import Floats
+from ferryid.types import Floats, Ints
 
 SAMPLES = 200
 """Places of a log, evenly spaced, that are looked for in the other."""
@@ -21,19 +24,15 @@ ROWS = 8
 """Rows in sequence that have to be alike at such a place."""
 TRIED = 50
 """Places at which the first of these rows is tried, most."""
-
-
-WANTED = (("x", "y"), ("u", "v"), ("psi",))
-"""Signals that are compared, the first of which both logs have."""
-Samples = tuple[Floats, ...]
-"""Values of each of `WANTED` in single precision, shape (n, signals): formats differ in more."""
+COMPARED = (("x", "y"), ("u", "v"), ("psi",))
+"""Signals of one topic that are compared: the first of them that both logs have and that changes."""
 
 
 class GivenLogs:
     """The logs that a command was given so far, none of them twice."""
 
     def __init__(self) -> None:
-        self._known: list[tuple[str, str, Samples]] = []
+        self._known: list[tuple[str, str, Searchable]] = []
         self._files: set[str] = set()
 
     def add(self, recording: Recording) -> None:
@@ -45,11 +44,11 @@ class GivenLogs:
             For one that was given before: with the same content, as a copy in another format or a piece, or with a file of its
             own that is part of both.
         """
-        name, samples = recording.files[0], _samples_of(recording)
+        name, samples = recording.files[0], searchable([recording])[0]
         for other, sha256, known in self._known:
             if recording.sha256 == sha256:
                 raise FerryIdError(f"{name}: the same log as {other}, which would count twice. Fix: give it once")
-            if _same_samples(samples, known):
+            if samples.same(known):
                 raise FerryIdError(
                     f"{name}: holds the recording of {other}, or a piece of it, which would count twice. "
                     "Fix: give one of the two"
@@ -67,46 +66,73 @@ def same_recording(one: Recording, other: Recording) -> bool:
     Values count as measured, not their times: a clock may have been set, and a begin cut off. Where the vessel lies still, or
     a sensor repeats its value, nothing is compared.
     """
-    return _same_samples(_samples_of(one), _samples_of(other))
+    first, second = searchable([one, other])
+    return first.same(second)
 
 
-def _samples_of(recording: Recording) -> Samples:
-    return tuple(_signals(recording, wanted) for wanted in WANTED)
+def searchable(recordings: Sequence[Recording]) -> list[Searchable]:
+    """Return the samples of recordings, each of which is to be compared with several: what is sorted is sorted once."""
+    return [Searchable(tuple(_Sequence(_signals(one, wanted)) for wanted in COMPARED)) for one in recordings]
 
 
-def _same_samples(one: Samples, other: Samples) -> bool:
-    for several in zip(one, other, strict=True):
-        if all(len(values) >= ROWS for values in several):
-            shorter, longer = sorted(several, key=len)
-            share = _found_share(shorter, longer)
-            if share is not None:
-                return share >= SIGNALS.shared_samples
-    return False
+@dataclass(frozen=True, eq=False)
+class Searchable:
+    """The samples of a recording by `COMPARED`."""
+
+    kinds: tuple[_Sequence, ...]
+
+    def same(self, other: Searchable) -> bool:
+        """Return what `same_recording` does."""
+        for several in zip(self.kinds, other.kinds, strict=True):
+            if all(len(one.values) >= ROWS for one in several):
+                shorter, longer = sorted(several, key=lambda one: len(one.values))
+                share = shorter.found_share(longer)
+                if share is not None:
+                    return share >= SIGNALS.shared_samples
+        return False
+
+
+@dataclass(frozen=True, eq=False)
+class _Sequence:
+    """Samples of some signals in single precision, as formats differ, shape (n, signals)."""
+
+    values: Floats
+
+    @cached_property
+    def _order(self) -> Ints:
+        return np.argsort(self.values[:, 0], kind="stable")
+
+    @cached_property
+    def _rising(self) -> Floats:
+        return np.asarray(self.values[self._order, 0])
+
+    @cached_property
+    def _pieces(self) -> Floats:
+        """Some `ROWS` in sequence that change, at places that are evenly spaced, shape (pieces, ROWS, signals)."""
+        places = np.unique(np.linspace(0, len(self.values) - ROWS, SAMPLES).astype(np.int64))
+        every = self.values[places[:, None] + np.arange(ROWS)]
+        alike = (every[:, :, None] == every[:, None]).all(axis=-1)
+        different = ROWS - np.tril(alike, -1).any(axis=2).sum(axis=1)
+        # Steps of a coarse sensor, or of one that repeats its values, look alike by chance.
+        return np.asarray(every[different > ROWS // 2])
+
+    def found_share(self, longer: _Sequence) -> float | None:
+        """Return the share of pieces that another series has as well; None where this one hardly changes."""
+        pieces = self._pieces
+        if not len(pieces):
+            return None
+        low, high = (np.searchsorted(longer._rising, pieces[:, 0, 0], side) for side in ("left", "right"))
+        found = 0
+        for k in np.flatnonzero(high > low).tolist():
+            tried = longer._order[low[k] : min(high[k], low[k] + TRIED)].tolist()
+            found += any(np.array_equal(longer.values[at : at + ROWS], pieces[k]) for at in tried)
+        return found / len(pieces)
 
 
 def _signals(recording: Recording, wanted: tuple[str, ...]) -> Floats:
-    """Return signals of one topic in single precision, as formats differ, shape (n, signals); none without them all."""
+    """Return signals of one topic, shape (n, signals); none without them all."""
     stream = next((each for each in recording.streams.values() if set(wanted) <= set(each.columns)), None)
     if stream is None:
         return np.empty((0, len(wanted)), dtype=np.float32)
     values = np.column_stack([stream.columns[name] for name in wanted]).astype(np.float32)
     return np.asarray(values[np.isfinite(values).all(axis=1)])
-
-
-def _found_share(shorter: Floats, longer: Floats) -> float | None:
-    """Return the share of places of a series that the other one has as well; None where it hardly changes."""
-    places = np.unique(np.linspace(0, len(shorter) - ROWS, SAMPLES).astype(np.int64))
-    # Steps of a coarse sensor, or of one that repeats its values, look alike by chance.
-    changing = [k for k in places.tolist() if len(np.unique(shorter[k : k + ROWS], axis=0)) > ROWS // 2]
-    if not changing:
-        return None
-    order = np.argsort(longer[:, 0], kind="stable")
-    values = longer[order, 0]
-    found = 0
-    for k in changing:
-        low, high = (int(np.searchsorted(values, shorter[k, 0], side)) for side in ("left", "right"))
-        piece = shorter[k : k + ROWS]
-        found += any(
-            np.array_equal(longer[at : at + ROWS], piece) for at in order[low : min(high, low + TRIED)].tolist()
-        )
-    return found / len(changing)

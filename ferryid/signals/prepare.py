@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -49,9 +50,13 @@ class Prepared:
 
     recording: Recording
     motion: Motion
-    quality: Mapping[str, Any]
     doubts: tuple[str, ...] = ()
     track: Track | None = None
+
+    @cached_property
+    def quality(self) -> Mapping[str, Any]:
+        """What is known of the quality of its signals: see `ferryid.signals.data_quality`."""
+        return data_quality(self.recording, self.motion)
 
     @property
     def left_out(self) -> tuple[str, ...]:
@@ -165,5 +170,4 @@ def prepare(
 def smoothed(opened: Opened, window_s: float, smoother: str = "square", *, keep_track: bool = False) -> Prepared:
     """Smooth an opened log; arguments and errors are those of `prepare`."""
     motion = smooth_measured(opened.measured, window_s, smoother)
-    quality = data_quality(opened.recording, motion)
-    return Prepared(opened.recording, motion, quality, opened.doubts, opened.track if keep_track else None)
+    return Prepared(opened.recording, motion, opened.doubts, opened.track if keep_track else None)

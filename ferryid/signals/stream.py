@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from ferryid.ingest.clocks import ClockReport
 from ferryid.ingest.log import Loss, Topic
@@ -98,3 +100,20 @@ class Recording:
     def end_ns(self) -> int:
         """Last time of any stream [ns]."""
         return max(int(stream.time_ns[-1]) for stream in self.streams.values() if len(stream.time_ns))
+
+
+POSE_AND_VELOCITY = ("x", "y", "psi", "u", "v", "vel_N", "vel_E")
+"""Signals that show which recording this is, and whether it is one of a vessel."""
+
+
+def compact(recording: Recording) -> Recording:
+    """Return a recording with the samples of `POSE_AND_VELOCITY` alone, and of the other topics the first and last time.
+
+    Times of reception are not kept.
+    """
+    streams = {}
+    for topic, stream in recording.streams.items():
+        columns = {name: stream.columns[name] for name in POSE_AND_VELOCITY if name in stream.columns}
+        time_ns = stream.time_ns if columns else np.concatenate([stream.time_ns[:1], stream.time_ns[1:][-1:]])
+        streams[topic] = replace(stream, time_ns=time_ns, columns=columns, receive_ns=time_ns)
+    return replace(recording, streams=streams)

@@ -48,7 +48,7 @@ class Task:
     def data(self) -> LogData:
         """Smoothed motions of which every valid row trains."""
         motions = [smooth_measured(one.measured, TEST_WINDOW_S) for one in self.logs]
-        prepared = [Prepared(one.recording, motion, {}) for one, motion in zip(self.logs, motions, strict=True)]
+        prepared = [Prepared(one.recording, motion) for one, motion in zip(self.logs, motions, strict=True)]
         data = compute_residuals(self.profile, self.settings, prepared)
         none = tuple(np.zeros(len(motion.t), dtype=bool) for motion in data.motions)
         valid = tuple(motion.valid for motion in data.motions)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -14,16 +13,18 @@ from ferryid.diagnose.data.thresholds import DATA
 from ferryid.effects.force_model import Measurements
 from ferryid.effects.measurements import actuator_forces, interpolate_gaps, rudder_states
 from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.models import validity_ranges
 from ferryid.signals.align import align
 from ferryid.signals.complementary_filter import MEAN_S, complementary_filter
 from ferryid.signals.consistency import comparable
 from ferryid.signals.data_quality import left_out_sentences, repair_sentences
 from ferryid.signals.faults import find_faults
 from ferryid.signals.prepare import doubts_of
-from ferryid.signals.recording import Recording, data_quality, record
+from ferryid.signals.recording import Recording, record
 from ferryid.signals.sampling import check_sampling
 from ferryid.signals.smooth import Measured, measure, odd_rows, smooth_measured, steady_mean
 from ferryid.signals.source import Held
+from ferryid.signals.stream import compact
 from ferryid.signals.track import LeftOut, Motion, Track
 from ferryid.types import IN_MEMORY, Flags, Floats, RunContext
 from ferryid.vessel.dimensions import window_seconds
@@ -42,6 +43,38 @@ CHANNELS = {"x": (0, 1), "y": (0, 1), "psi": (2,), "u": (3,), "v": (4,), "r": (5
 
 
 @dataclass(frozen=True)
+class UsedRows:
+    """The rows of a log that a fit would use.
+
+    Attributes
+    ----------
+    log
+        Name of the log.
+    rows, seconds
+        Their number, and their length together [s].
+    ranges
+        Ranges of validity of what they teach.
+    repairs, left_out
+        As of `ferryid.signals.track.Motion`.
+    """
+
+    log: str
+    rows: int
+    seconds: float
+    ranges: Mapping[str, tuple[float, float]]
+    repairs: tuple[str, ...]
+    left_out: tuple[LeftOut, ...]
+
+    @classmethod
+    def of(cls, motion: Motion) -> UsedRows:
+        """Return what is told of a smoothed log."""
+        valid = motion.valid
+        ranges = validity_ranges(motion.nu[valid], motion.nu_dot[valid])
+        seconds = float(valid.sum() / motion.rate_hz)
+        return cls(motion.log, int(valid.sum()), seconds, ranges, motion.repairs, motion.left_out)
+
+
+@dataclass(frozen=True)
 class Survey:
     """What is known of a log besides its measurements.
 
@@ -50,8 +83,10 @@ class Survey:
     recording
         The log's signals.
     motion
-        Smoothed as for a fit: for free runs and figures.
-    quality, doubts
+        Smoothed as for a fit; None where only `used` was kept of it.
+    used
+        What of it a model file tells.
+    doubts
         As in `ferryid.signals.prepare.Prepared`; here no doubt stops anything.
     hidden
         What was withheld, by name: shape (n, 2), NaN where it was not measured.
@@ -70,8 +105,8 @@ class Survey:
     """
 
     recording: Recording
-    motion: Motion
-    quality: Mapping[str, Any]
+    motion: Motion | None
+    used: UsedRows
     doubts: tuple[str, ...]
     hidden: Mapping[str, Floats]
     t0_ns: int
@@ -98,8 +133,10 @@ def measure_log(
     *,
     withhold: Sequence[str] = (),
 ) -> MeasuredLog:
-    """Read and align a log; parameters and errors as of `read_measurements`."""
-    return MeasuredLog(path, *read_measurements(path, profile, run, withhold=withhold))
+    """Read and align a log, of which samples and motion are not kept; parameters and errors as of `read_measurements`."""
+    measurements, survey = read_measurements(path, profile, run, withhold=withhold)
+    # A campaign holds all of its logs at once: what is needed of none is let go.
+    return MeasuredLog(path, measurements, replace(survey, recording=compact(survey.recording), motion=None))
 
 
 def read_measurements(
@@ -173,7 +210,7 @@ def read_measurements(
     survey = Survey(
         recording,
         motion,
-        data_quality(recording, motion),
+        UsedRows.of(motion),
         doubts,
         hidden,
         track.t0_ns,

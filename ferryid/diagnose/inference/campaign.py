@@ -19,7 +19,7 @@ from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS, ForceModel
 from ferryid.models import Model
-from ferryid.signals.copies import same_recording
+from ferryid.signals.copies import searchable
 from ferryid.types import Floats
 from ferryid.vessel.dimensions import dimensions
 from ferryid.vessel.profile import Profile
@@ -120,17 +120,13 @@ def _conditions_of_logs(members: Sequence[Member], reference: Sequence[bool]) ->
 def repeated(logs: Sequence[AveragedLog]) -> list[tuple[str, str]]:
     """Return the paths of logs that hold the motion of another before them, in whatever format, and that other's path."""
     found: list[tuple[str, str]] = []
+    samples = searchable([log.screened.measured.survey.recording for log in logs])
     for k, log in enumerate(logs):
-        for other in logs[:k]:
-            if log.path != other.path and (_same(log.windows, other.windows) or _piece(log, other)):
+        for other, before in zip(logs[:k], samples, strict=False):
+            if log.path != other.path and (_same(log.windows, other.windows) or samples[k].same(before)):
                 found.append((log.path, other.path))
                 break
     return found
-
-
-def _piece(one: AveragedLog, other: AveragedLog) -> bool:
-    recordings = [log.screened.measured.survey.recording for log in (one, other)]
-    return same_recording(*recordings)
 
 
 def _same(one: Windows, other: Windows) -> bool:

@@ -95,7 +95,7 @@ def learn_simulation(path: str, profile: Profile, run: RunContext = IN_MEMORY) -
     """
     measurements, survey = read_measurements(path, profile, run)
     sensors, measurements = examine(measurements)
-    name = survey.motion.log
+    name = survey.used.log
     simulated_windows = windows(measurements, *window_lengths(profile))
     if len(simulated_windows.starts) < INFERENCE.fewest_windows:
         raise FerryIdError(

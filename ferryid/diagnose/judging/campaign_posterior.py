@@ -15,7 +15,7 @@ from ferryid.diagnose.data.measurements import Survey
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.judging.campaign import JudgedCampaign
 from ferryid.diagnose.judging.finding import Finding
-from ferryid.diagnose.judging.posterior import Posterior, ranges_of, stored_effect, trained
+from ferryid.diagnose.judging.posterior import Posterior, stored_effect, trained
 from ferryid.models import Source, StoredEffect
 from ferryid.types import Floats
 
@@ -67,7 +67,7 @@ def campaign_posterior(
         return None
     return Posterior(
         trained(survey),
-        ranges_of(survey),
+        survey.used.ranges,
         tuple(vessel),
         tuple(conditions),
         together.hull_posterior,
@@ -78,7 +78,7 @@ def campaign_posterior(
 
 def _stored(candidate: Candidate, values: Floats, finding: Finding, survey: Survey) -> StoredEffect:
     source = Source(
-        survey.motion.log,
+        survey.used.log,
         survey.recording.sha256,
         finding.probability,
         None,

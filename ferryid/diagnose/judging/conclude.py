@@ -145,7 +145,7 @@ def _too_short(
     errors = None if together is None else together.errors(log.path, findings)
     before, after = ({}, {}) if errors is None else errors.scores(window_s)
     return Diagnosis(
-        screened.measured.survey.motion.log,
+        screened.measured.survey.used.log,
         profile.name,
         verdict_of(findings, remainder),
         findings,
@@ -154,7 +154,7 @@ def _too_short(
         (*survey_notes(screened), *remedies(screened, findings), *noted, short, *notes),
         evidence=_measured(log.windows) if errors is None else _leftover(errors.windows, errors.before, errors.after),
         duration_s=_duration_s(screened),
-        left_out=screened.measured.survey.motion.left_out,
+        left_out=screened.measured.survey.used.left_out,
         remainder=remainder,
     )
 
@@ -209,7 +209,7 @@ def _concluded(
         *recording_advice(chances, still, measurements.profile.setting),
     )
     return Diagnosis(
-        survey.motion.log,
+        survey.used.log,
         measurements.profile.name,
         verdict_of(findings, remainder),
         findings,
@@ -222,7 +222,7 @@ def _concluded(
         against=estimated.expectation.comparison,
         moved=refitted_hull(problem, kept).farthest if kept.candidates else None,
         duration_s=_duration_s(screened),
-        left_out=survey.motion.left_out,
+        left_out=survey.used.left_out,
         posterior=posterior,
         wider=None if together is not None else wider,
         remainder=remainder,
@@ -286,7 +286,7 @@ def survey_notes(log: ScreenedLog) -> tuple[str, ...]:
         *survey.doubts,
         *survey.left_out,
         *log.notes,
-        *(one for one in survey.motion.repairs if one.startswith(names)),
+        *(one for one in survey.used.repairs if one.startswith(names)),
     )
 
 

@@ -18,13 +18,16 @@ from ferryid.identify import (
     FitOutcome,
     FitSettings,
     accept,
-    fit_logs,
+    fit_opened,
     fit_remainder,
     prediction_errors,
+    read_logs,
     with_remainder,
 )
 from ferryid.models import ForceScores, Model, ModelScores, StoredEffect, blank_model
+from ferryid.models.store import check_name
 from ferryid.side_by_side import over
+from ferryid.signals.prepare import Opened
 from ferryid.types import AXES, Flags, Floats, RunContext, by_axis
 from ferryid.vessel.profile import Profile
 
@@ -72,11 +75,29 @@ class Learned:
 
 
 @dataclass(frozen=True)
+class _Fitted:
+    """A fit without the rows of its logs but for which of them validate, shape (n,) each."""
+
+    outcome: FitOutcome
+    validation: tuple[Flags, ...]
+
+    @classmethod
+    def of(cls, outcome: FitOutcome) -> _Fitted:
+        """Return what is needed of a fit: several are alive at once, and a campaign has many rows."""
+        return cls(replace(outcome, logs=()), tuple(one.validation for one in outcome.logs))
+
+
+@dataclass(frozen=True)
 class _Candidate:
-    """A model with a correction on top, and how it was judged."""
+    """A model with a correction on top, and the fit of that correction."""
 
     model: Model
-    outcome: FitOutcome
+    fitted: _Fitted
+
+    @property
+    def outcome(self) -> FitOutcome:
+        """How it was judged."""
+        return self.fitted.outcome
 
 
 @dataclass(frozen=True)
@@ -140,9 +161,10 @@ class Learner:
         unseen = replace(wider, hull=start.hull)
         sure = _confirmed(unseen)
         found = self._remainder(unseen)
-        beside = self._remainder(sure).model if _effects(sure) else self._plain.model
-        rows = [a.validation & b.validation for a, b in zip(self._plain.logs, found.outcome.logs, strict=True)]
-        compared = [start, beside, self._plain.model, unseen, found.model]
+        plain = self._plain.outcome
+        beside = self._remainder(sure).model if _effects(sure) else plain.model
+        rows = _both(self._plain, found.fitted)
+        compared = [start, beside, plain.model, unseen, found.model]
         base, without, fitted, bare, after = self._errors(compared, rows)
         verdict, change = _judged(found.outcome, bare, after), _over(after, without)
         if not (verdict.accepted and accept(without, after, "prediction").accepted):
@@ -162,9 +184,15 @@ class Learner:
         return stored, Learned(True, says, verdict.reasons, by_axis(change), over_fit, with_hints=True)
 
     @cached_property
-    def _plain(self) -> FitOutcome:
+    def _opened(self) -> list[Opened]:
+        """The logs, read once for all fits."""
+        return read_logs(self.paths, self.profile, self.settings, self.run, whole=False)
+
+    @cached_property
+    def _plain(self) -> _Fitted:
         """The fit alone."""
-        return fit_logs(self.paths, self.profile, self.settings, self.run, name=self.profile.name)
+        name, settings = check_name(self.profile.name), self.settings.on(self.profile)
+        return _Fitted.of(fit_opened(self._opened, self.profile, settings, self.run, name))
 
     def _known_start(self) -> Model:
         assert self.start is not None
@@ -172,7 +200,7 @@ class Learner:
 
     def _fitted(self, name: str) -> tuple[Model | None, Learned]:
         """Return what a fit alone makes of the logs, of which nothing was named."""
-        found = self._plain
+        found = self._plain.outcome
         ratio, accepted = found.acceptance.per_axis, found.acceptance.accepted
         said = _says(
             "No named effect enters the model. A correction of the hull", ratio, found.acceptance, "the profile's hull"
@@ -184,8 +212,8 @@ class Learner:
     def _on_top(self, base: Model, diagnosed: Model | None) -> tuple[Model | None, Learned]:
         """Return the model to store: what is examined or diagnosed, with a correction where that is accepted."""
         start = self.start or blank_model(self.profile, base.name)
-        plain, found = self._plain_and_remainder(base)
-        rows = [one.validation & other.validation for one, other in zip(plain.logs, found.outcome.logs, strict=True)]
+        alone, found = self._plain_and_remainder(base)
+        plain, rows = alone.outcome, _both(alone, found.fitted)
         before, known, after, fitted = self._errors([start, base, found.model, plain.model], rows)
         verdict, what = _judged(found.outcome, known, after), "A correction learned on top of the findings"
         best = after if verdict.accepted else known
@@ -212,9 +240,11 @@ class Learner:
             )
         return stored, Learned(verdict.accepted, said, verdict.reasons, by_axis(_over(after, known)), by_axis(over_fit))
 
-    def _plain_and_remainder(self, base: Model) -> tuple[FitOutcome, _Candidate]:
+    def _plain_and_remainder(self, base: Model) -> tuple[_Fitted, _Candidate]:
         """Return the fit alone, and that to what a model leaves, made side by side."""
-        plain, left = list[FitOutcome](), list[_Candidate]()
+        plain, left = list[_Fitted](), list[_Candidate]()
+        # Read before there are two that ask for them.
+        _ = self._opened
 
         def make(alone: bool) -> None:
             if alone:
@@ -226,11 +256,16 @@ class Learner:
         return plain[0], left[0]
 
     def _remainder(self, base: Model) -> _Candidate:
-        outcome = fit_remainder(base, self.paths, self.profile, self.settings, self.run)
-        return _Candidate(with_remainder(base, outcome.model), outcome)
+        outcome = fit_remainder(base, self._opened, self.profile, self.settings, self.run)
+        return _Candidate(with_remainder(base, outcome.model), _Fitted.of(outcome))
 
     def _errors(self, models: Sequence[Model], rows: Sequence[Flags]) -> list[Floats]:
-        return prediction_errors(models, self.paths, self.profile, self.settings, self.run, rows)
+        return prediction_errors(models, self._opened, self.profile, self.settings, rows)
+
+
+def _both(one: _Fitted, other: _Fitted) -> list[Flags]:
+    """Return the rows that validate in two fits to the same logs, shape (n,) each."""
+    return [mine & theirs for mine, theirs in zip(one.validation, other.validation, strict=True)]
 
 
 def without_withheld(profile: Profile, withhold: Sequence[str]) -> Profile:

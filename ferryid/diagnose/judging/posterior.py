@@ -16,7 +16,7 @@ from ferryid.diagnose.judging.claims import Key
 from ferryid.diagnose.judging.credibility import IN_THE_HULL, refitted_hull
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.effects.force_model import COEFFICIENTS
-from ferryid.models import Quantity, Source, StoredEffect, validity_ranges
+from ferryid.models import Quantity, Source, StoredEffect
 from ferryid.types import Floats
 
 
@@ -106,7 +106,7 @@ def posterior_of(
     ]
     if len(accepted) < len(kept.candidates):
         kept = fit(problem, [kept.candidates[i] for i in accepted], [kept.values[i] for i in accepted])
-    motion, recording = survey.motion, survey.recording
+    log, recording = survey.used.log, survey.recording
     # Without what was doubtful, the hull may bend as far as it did with it.
     doubt = refitted_hull(problem, kept).doubt if known else ""
     stored = []
@@ -114,7 +114,7 @@ def posterior_of(
         if candidate.effect.id != IN_THE_HULL:
             finding = reported[candidate.key]
             source = Source(
-                motion.log,
+                log,
                 recording.sha256,
                 finding.probability,
                 # Those that are told, which are the middles of their intervals.
@@ -135,9 +135,7 @@ def posterior_of(
         candidate = state.candidate
         if candidate.key in reported and reported[candidate.key].sure:
             finding = reported[candidate.key]
-            source = Source(
-                motion.log, recording.sha256, finding.probability, finding.onset_s, offset_s=finding.offset_s
-            )
+            source = Source(log, recording.sha256, finding.probability, finding.onset_s, offset_s=finding.offset_s)
             found = {
                 name: Quantity(one.value, one.low, one.high, one.unit)
                 if name in state.known
@@ -147,7 +145,7 @@ def posterior_of(
             stored.append((False, StoredEffect(*candidate.key, found, (source,))))
     return Posterior(
         training=trained(survey),
-        ranges=ranges_of(survey),
+        ranges=survey.used.ranges,
         vessel=tuple(one for vessel, one in stored if vessel),
         conditions=tuple(one for vessel, one in stored if not vessel),
         hull=None if doubt else _hull(problem, kept),
@@ -158,20 +156,14 @@ def posterior_of(
 
 def trained(survey: Survey) -> dict[str, object]:
     """Return a log as a model file lists what it was trained on."""
-    motion, recording = survey.motion, survey.recording
+    used, recording = survey.used, survey.recording
     return {
-        "name": motion.log,
+        "name": used.log,
         "files": [str(file).rpartition("/")[2] for file in recording.files],
         "sha256": recording.sha256,
-        "seconds": float(motion.valid.sum() / motion.rate_hz),
-        "rows": int(motion.valid.sum()),
+        "seconds": used.seconds,
+        "rows": used.rows,
     }
-
-
-def ranges_of(survey: Survey) -> Mapping[str, tuple[float, float]]:
-    """Return the ranges of validity of what a log teaches."""
-    rows = survey.motion.valid
-    return validity_ranges(survey.motion.nu[rows], survey.motion.nu_dot[rows])
 
 
 def stored_effect(

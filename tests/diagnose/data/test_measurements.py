@@ -72,12 +72,14 @@ def test_each_thruster_pushes_along_its_angle_and_turns_by_its_lever(short: Meas
 
 def test_the_thrusters_together_are_the_applied_force() -> None:
     measurements, survey = read_measurements(SHORT, FERRY, window_s=0.0)
+    assert survey.motion is not None
     rows = survey.motion.valid & measurements.usable
     np.testing.assert_allclose(measurements.parts.sum(axis=1)[rows], survey.motion.tau[rows], atol=1e-9)
 
 
 def test_the_velocity_is_kept_as_measured_beside_the_calmer_one() -> None:
     measurements, survey = read_measurements(SHORT, FERRY)
+    assert survey.motion is not None
     np.testing.assert_array_equal(measurements.nu_raw[measurements.usable], survey.motion.raw_nu[measurements.usable])
     assert np.isfinite(measurements.nu).all()
     rough, calm = (np.abs(np.diff(values, axis=0)).mean(axis=0) for values in (measurements.nu_raw, measurements.nu))
@@ -90,6 +92,7 @@ def test_a_withheld_wind_is_hidden_and_kept() -> None:
     assert seen.wind is not None
     blind, survey = read_measurements(SHORT, FERRY, window_s=0.0, withhold=("wind",))
     assert blind.wind is None
+    assert survey.motion is not None
     assert survey.motion.wind is None
     np.testing.assert_array_equal(survey.hidden["wind"][: len(seen.t)][seen.usable], seen.wind[seen.usable])
 
@@ -197,6 +200,7 @@ def test_a_tanker_with_propeller_and_rudder_is_measured(shared_data: Callable[[s
     log = shared_data("esso_osaka/random/random_06-Aug-2020_16_24_25_1.csv")
     profile = load_profile("esso-osaka")
     measurements, survey = read_measurements(str(log), profile, withhold=("wind",), window_s=0.0)
+    assert survey.motion is not None
     rows = survey.motion.valid & measurements.usable
     np.testing.assert_allclose(measurements.parts.sum(axis=1)[rows], survey.motion.tau[rows], atol=1e-9)
     assert np.isnan(measurements.angles).all()

@@ -14,13 +14,12 @@ import numpy as np
 import pytest
 
 from ferryid.compare.evaluation import evaluate
-from ferryid.diagnose.judging import learning
 from ferryid.diagnose.judging.diagnosis import Diagnosis, to_json
 from ferryid.diagnose.judging.learning import Learner, without_withheld
 from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS, UNITS, hull_of
 from ferryid.export.model_file import export_model
-from ferryid.identify import Acceptance, FitSettings, accept, fit_logs, prediction_errors, with_remainder
+from ferryid.identify import Acceptance, FitSettings, accept, fit_logs, prediction_errors, read_logs, with_remainder
 from ferryid.identify.outcome import EstimatorScore
 from ferryid.models import Conditions, ForceScores, Model, ModelScores, Quantity, Source, StoredEffect, blank_model
 from ferryid.models.forces import beside_the_hull
@@ -92,7 +91,8 @@ def learned_on(log: str, folder: Path, model: Model | None, name: str = "ferry")
 def errors_on(log: str, folder: Path, *models: Model) -> list[float]:
     """Return root-mean-square prediction errors on a whole log, over the first model's, mean of the axes."""
     motion = prepare(log, FERRY, folder, window_s=1.0).motion
-    every = prediction_errors(models, [log], FERRY, QUICK, RunContext(folder), [motion.valid])
+    opened = read_logs([log], FERRY, QUICK, RunContext(folder))
+    every = prediction_errors(models, opened, FERRY, QUICK, [motion.valid])
     return [float(np.mean(np.sqrt(one / every[0]))) for one in every]
 
 
@@ -349,26 +349,28 @@ def test_which_correction_is_stored(
 ) -> None:
     """Held-out errors are 100 without a correction, `first` with it, `second` with that on the hull as it was."""
     diagnosed = replace(blank_model(FERRY, "ferry"), hull=hull_of_ferry())
-    rows = (SimpleNamespace(validation=np.ones(3, dtype=bool)),)
+    rows = (np.ones(3, dtype=bool),)
     good = accept(np.full(3, 100.0), np.full(3, 50.0), "prediction")
     scores = ModelScores(ForceScores.of(np.ones(3), np.ones(3), np.ones(3)), 9, 9.0, "blocks", ())
     errors = {"none": 100.0, "first": first, "second": second, "fit": fitted}
     models = {name: replace(diagnosed, settings={**diagnosed.settings, "test": name}, scores=scores) for name in errors}
 
-    def fit(*_: object, **__: object) -> SimpleNamespace:
-        return SimpleNamespace(acceptance=good, logs=rows, model=models["fit"])
+    def fit(_: Learner) -> SimpleNamespace:
+        return SimpleNamespace(outcome=SimpleNamespace(acceptance=good, model=models["fit"]), validation=rows)
 
     def remainder(_: Learner, base: Model) -> SimpleNamespace:
         estimators = (EstimatorScore("weak", folds, 0.5, True),)
         # Of other rows than those on which the models are compared.
         own = accept(np.full(3, 100.0), np.full(3, 33.0), "prediction")
-        outcome = SimpleNamespace(acceptance=own, logs=rows, estimators=estimators, model=models["first"])
-        return SimpleNamespace(model=models["first" if base.hull else "second"], outcome=Outcome(**vars(outcome)))
+        outcome = Outcome(own, estimators, models["first"])
+        fitted = SimpleNamespace(outcome=outcome, validation=rows)
+        return SimpleNamespace(model=models["first" if base.hull else "second"], outcome=outcome, fitted=fitted)
 
     def measured(_: Learner, several: Sequence[Model], __: object) -> list[np.ndarray]:
         return [np.full(3, errors[str(one.settings.get("test", "none"))]) for one in several]
 
-    monkeypatch.setattr(learning, "fit_logs", fit)
+    monkeypatch.setattr(Learner, "_opened", property(lambda _: []))
+    monkeypatch.setattr(Learner, "_plain", property(fit))
     monkeypatch.setattr(Learner, "_remainder", remainder)
     monkeypatch.setattr(Learner, "_errors", measured)
     stored, learned = Learner(("log",), FERRY, None, RunContext(Path("nowhere"))).learn(diagnosed, "ferry")
@@ -387,6 +389,5 @@ class Outcome:
     """What is read of the outcome of a fit."""
 
     acceptance: Acceptance
-    logs: tuple[object, ...]
     estimators: tuple[EstimatorScore, ...]
     model: Model
