@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path, PurePath
@@ -257,6 +257,7 @@ def diagnose_and_store(
     run: RunContext,
     *,
     name: str = "",
+    diagnosed: Callable[[Sequence[Diagnosis]], None] | None = None,
 ) -> tuple[Diagnosis, ...]:
     """Diagnose logs and store the model that the findings lead to.
 
@@ -268,6 +269,8 @@ def diagnose_and_store(
         Output folder, whose ``models`` keep the model; else as of `diagnose`.
     name
         Name of the model; that of the examined model, else the vessel's, where empty.
+    diagnosed
+        Called with the diagnoses before anything is learned beside their findings, which stay as they are.
 
     Raises
     ------
@@ -277,6 +280,8 @@ def diagnose_and_store(
     if name:
         check_name(name)
     found = diagnose(logs, profile, settings, run)
+    if diagnosed is not None:
+        diagnosed(found)
     learner = None
     # Of a simulation no model comes.
     if settings.against is None:

@@ -15,6 +15,7 @@ from ferryid.diagnose import UNKNOWN, Diagnosis, Estimate, Finding, Withheld
 from ferryid.effects.wording import listed
 from ferryid.report import diagnosis_words, second_sources
 from ferryid.report.diagnosis_errors import fitted, ratio_of
+from ferryid.report.drawings import NONE, Drawings
 from ferryid.report.figures import MEASURED, NEW, STYLE, canvas, svg_text
 from ferryid.types import AXES
 
@@ -142,14 +143,14 @@ def flow_figure(diagnoses: Sequence[Diagnosis], effect: str) -> str:
         return svg_text(figure)
 
 
-def section(diagnoses: Sequence[Diagnosis]) -> dict[str, Any]:
-    """Return what the page shows of several logs together."""
+def section(diagnoses: Sequence[Diagnosis], drawings: Drawings = NONE) -> dict[str, Any]:
+    """Return what the page shows of several logs together; `drawings` are those that exist already."""
     flows = []
     for effect in FLOWS:
         rows = flow_rows(diagnoses, effect)
         if not rows:
             continue
-        drawing = flow_figure(diagnoses, effect)
+        drawing = drawings.of(f"all-{effect}", flow_figure, diagnoses, effect)
         caption = f"The {effect} of each log: where it flows to, estimated with one hull for all logs."
         flows.append(
             {

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from ferryid.diagnose import Course, Diagnosis, Finding, MeasuredCourse, Profiled
+from ferryid.report.drawings import Drawings
 from ferryid.report.figures import (
     BASE,
     MEASURED,
@@ -331,8 +332,11 @@ def _steps(ax: Axes, diagnosis: Diagnosis, edges: Floats, values: Mapping[str, F
     ax.yaxis.set_minor_locator(NullLocator())
 
 
-def figures_of(diagnosis: Diagnosis) -> Sequence[tuple[str, str, str]]:
-    """Return name, drawing and caption of every figure of the whole log that its evidence allows."""
+def figures_of(diagnosis: Diagnosis, prefix: str, drawings: Drawings) -> Sequence[tuple[str, str, str]]:
+    """Return file, drawing and caption of every figure of the whole log that its evidence allows.
+
+    Names of files begin with `prefix`; `drawings` are those that exist already.
+    """
     evidence = diagnosis.evidence
     if not all(len(evidence.get(name, ())) > 1 for name in ("t", "before")):
         return ()
@@ -340,8 +344,8 @@ def figures_of(diagnosis: Diagnosis) -> Sequence[tuple[str, str, str]]:
     apart = " Shaded: what is left out of the log." if diagnosis.left_out else ""
     shown = [
         (
-            "left-over",
-            left_over(diagnosis),
+            f"{prefix}left-over",
+            drawings.of(f"{prefix}left-over", left_over, diagnosis),
             f"Force that the model leaves unexplained, over the whole log.{both}{apart}",
         )
     ]
@@ -350,15 +354,17 @@ def figures_of(diagnosis: Diagnosis) -> Sequence[tuple[str, str, str]]:
         for column, label in (("heading", "heading [deg]"), ("speed", "speed [m/s]")):
             if column in evidence:
                 caption = f"Mean of the same force against {column}, with 95 % intervals.{both}"
-                shown.append((f"by-{column}", by_regime(diagnosis, column, label), caption))
+                file = f"{prefix}by-{column}"
+                shown.append((file, drawings.of(file, by_regime, diagnosis, column, label), caption))
         return shown
     for k, one in enumerate(located.profiles[:PROFILES], 1):
         caption = (
             f"Its mean square by {one.name}, over that of the noise that remains; shaded: what noise alone would give. Bins "
             f"with too few windows are left out.{both}"
         )
-        shown.append((f"regime-{k}", in_regime(diagnosis, one), caption))
+        file = f"{prefix}regime-{k}"
+        shown.append((file, drawings.of(file, in_regime, diagnosis, one), caption))
     if located.bands:
         caption = f"Its root mean square in bands of frequency, by windows short enough to show them.{both}"
-        shown.append(("bands", in_bands(diagnosis), caption))
+        shown.append((f"{prefix}bands", drawings.of(f"{prefix}bands", in_bands, diagnosis), caption))
     return shown

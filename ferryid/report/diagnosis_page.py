@@ -23,6 +23,7 @@ from ferryid.report import (
     second_sources,
 )
 from ferryid.report.campaign import TEXT_COLUMNS
+from ferryid.report.drawings import NONE, Drawings
 from ferryid.report.html import template
 from ferryid.report.interactive import STATIC, Interactive
 from ferryid.report.left_out import left_out_table
@@ -39,8 +40,12 @@ def render(
     title: str,
     made: Mapping[str, str] | None = None,
     interactive: Interactive = STATIC,
+    drawings: Drawings = NONE,
 ) -> tuple[str, dict[str, str]]:
-    """Return the page on one log or several, and its drawings (SVG) by name; `made` are date, version and command."""
+    """Return the page on one log or several, and its drawings (SVG) by name; `made` are date, version and command.
+
+    `drawings` are those that exist already.
+    """
     several = len(diagnoses) > 1
     shared = diagnosis_words.notes_of_all(diagnoses)
     gathered = [note for note in shared if note in diagnoses[0].gathered]
@@ -48,14 +53,14 @@ def render(
     together = second_sources.of_all(diagnoses)
     logs = [
         {
-            **_log(one, f"{k + 1}-" if several else "", k < MAX_LOGS, shared, common),
+            **_log(one, f"{k + 1}-" if several else "", k < MAX_LOGS, shared, common, drawings),
             "timeline": interactive.number(k),
         }
         for k, one in enumerate(diagnoses)
     ]
     left = [one.log for one in diagnoses[MAX_LOGS:]]
-    of_campaign = campaign.section(diagnoses) if several else {}
-    of_all = likeness.section(diagnoses[0].likeness_of_all, "likeness", "these logs together")
+    of_campaign = campaign.section(diagnoses, drawings) if several else {}
+    of_all = likeness.section(diagnoses[0].likeness_of_all, "likeness", "these logs together", drawings=drawings)
     page = template("diagnosis.html").render(
         title=title,
         verdict=campaign_verdict([one.verdict for one in diagnoses]),
@@ -64,7 +69,7 @@ def render(
         campaign=of_campaign,
         logs=logs,
         where_common=diagnosis_words.where_common(diagnoses, common),
-        common=[_finding(one, f"all-finding-{k}", False, ()) for k, one in enumerate(common, 1)],
+        common=[_finding(one, f"all-finding-{k}", False, (), NONE) for k, one in enumerate(common, 1)],
         likeness=of_all,
         heat_maps=any(one.get("figures") for one in (of_all, *(log["likeness"] for log in logs))),
         sign=diagnosis_words.SIGN,
@@ -77,7 +82,7 @@ def render(
         assets=interactive.assets,
         omitted=f"Not drawn, but part of every number: {', '.join(left)}." if left else "",
     )
-    drawings = {
+    shown = {
         figure["file"]: figure["svg"]
         for log in logs
         for figure in (
@@ -91,8 +96,8 @@ def render(
         *of_all.get("figures", ()),
         *(one for flow in of_campaign.get("flows", ()) for one in flow["figures"]),
     ]
-    drawings |= {figure["file"]: figure["svg"] for figure in together_drawn}
-    return page, drawings
+    shown |= {figure["file"]: figure["svg"] for figure in together_drawn}
+    return page, shown
 
 
 def as_text(diagnoses: Sequence[Diagnosis]) -> str:
@@ -183,7 +188,12 @@ def _folded(line: str) -> str:
 
 
 def _log(
-    diagnosis: Diagnosis, prefix: str, drawn: bool, told: Sequence[str], common: Sequence[Finding]
+    diagnosis: Diagnosis,
+    prefix: str,
+    drawn: bool,
+    told: Sequence[str],
+    common: Sequence[Finding],
+    drawings: Drawings,
 ) -> dict[str, Any]:
     force_rows, free_run_rows = diagnosis_errors.force_rows(diagnosis), diagnosis_errors.free_run_rows(diagnosis)
     return {
@@ -192,19 +202,19 @@ def _log(
         "verdict": diagnosis.verdict,
         "headline": diagnosis_words.headline(diagnosis),
         "findings": [
-            _finding(one, f"{prefix}finding-{k}", drawn, diagnosis.left_out, diagnosis.withheld)
+            _finding(one, f"{prefix}finding-{k}", drawn, diagnosis.left_out, drawings, diagnosis.withheld)
             for k, one in enumerate(diagnosis_words.findings_of(diagnosis, common), 1)
         ],
         "left_out": left_out_table(diagnosis.left_out),
         "names": campaign.names_of(diagnosis, common),
         "force_rows": force_rows,
         "free_run_rows": free_run_rows,
-        "free_run_figures": _free_run_figures(diagnosis, prefix) if drawn else [],
+        "free_run_figures": _free_run_figures(diagnosis, prefix, drawings) if drawn else [],
         "intervals": any(" to " in cell for row in (*force_rows, *free_run_rows) for cell in row["cells"]),
         "free_run_note": diagnosis.before.get("free_run", {}).get("note", ""),
         "figures": [
-            {"file": f"{prefix}{name}", "svg": svg, "caption": caption, "over_time": name == "left-over"}
-            for name, svg, caption in (diagnosis_figures.figures_of(diagnosis) if drawn else ())
+            {"file": file, "svg": svg, "caption": caption, "over_time": file == f"{prefix}left-over"}
+            for file, svg, caption in (diagnosis_figures.figures_of(diagnosis, prefix, drawings) if drawn else ())
         ],
         "withheld": [
             {
@@ -229,7 +239,7 @@ def _log(
         # Of a campaign that of all logs is shown; the JSON has each log's own.
         "likeness": {}
         if diagnosis.likeness_of_all is not None
-        else likeness.section(diagnosis.likeness, f"{prefix}likeness", "this log", drawn=drawn),
+        else likeness.section(diagnosis.likeness, f"{prefix}likeness", "this log", drawn=drawn, drawings=drawings),
         "drawn": drawn and any(one.evidence for one in diagnosis.findings),
         "fitted": diagnosis_errors.fitted(diagnosis),
         "about_errors": diagnosis_words.about_errors(diagnosis),
@@ -239,7 +249,12 @@ def _log(
 
 
 def _finding(
-    finding: Finding, file: str, drawn: bool, left_out: Sequence[LeftOut], withheld: Sequence[Withheld] = ()
+    finding: Finding,
+    file: str,
+    drawn: bool,
+    left_out: Sequence[LeftOut],
+    drawings: Drawings,
+    withheld: Sequence[Withheld] = (),
 ) -> dict[str, Any]:
     shown = []
     if drawn and diagnosis_figures.compared(finding):
@@ -249,7 +264,7 @@ def _finding(
         shown.append(
             {
                 "file": f"{file}-evidence",
-                "svg": diagnosis_figures.on_regressor(finding),
+                "svg": drawings.of(f"{file}-evidence", diagnosis_figures.on_regressor, finding),
                 "caption": f"What is left over{since}, against {against}. Points: windows of the recording. Marks: their means "
                 "with 95 % intervals (Student's t times the standard error) from separate visits; hollow: from parts of one or "
                 "two visits, which know less; none where there are too few windows for either. Where the finding holds, orange "
@@ -262,7 +277,8 @@ def _finding(
             if shown
             else "What is left over; shaded: when it acts most, and what is left out of the log."
         )
-        shown.append({"file": f"{file}-time", "svg": diagnosis_figures.in_time(finding, left_out), "caption": caption})
+        svg = drawings.of(f"{file}-time", diagnosis_figures.in_time, finding, left_out)
+        shown.append({"file": f"{file}-time", "svg": svg, "caption": caption})
     if drawn and finding.course is not None:
         measured = next((one.course for one in withheld if one.signal == finding.effect), None)
         beside = (
@@ -273,7 +289,7 @@ def _finding(
         shown.append(
             {
                 "file": f"{file}-course",
-                "svg": diagnosis_figures.over_time(finding.course, measured),
+                "svg": drawings.of(f"{file}-course", diagnosis_figures.over_time, finding.course, measured),
                 "caption": "Its course over the log, estimated together with the hull: where it flows to, with "
                 f"the 95 % band{beside}.",
             }
@@ -282,7 +298,7 @@ def _finding(
         shown.append(
             {
                 "file": f"{file}-spectrum",
-                "svg": diagnosis_figures.in_frequency(finding),
+                "svg": drawings.of(f"{file}-spectrum", diagnosis_figures.in_frequency, finding),
                 "caption": "Power spectrum of what is left over with the other findings, on the axis on which it acts most. "
                 "What it explains: the spectrum of a disturbance of the strength and duration that were found, averaged over "
                 "windows like the rest. Where the finding holds, orange is nowhere far below it; far above it there is more.",
@@ -305,14 +321,15 @@ def _finding(
     }
 
 
-def _free_run_figures(diagnosis: Diagnosis, prefix: str) -> list[dict[str, str]]:
+def _free_run_figures(diagnosis: Diagnosis, prefix: str, drawings: Drawings) -> list[dict[str, str]]:
     before, after = diagnosis.before.get("free_run", {}), diagnosis.after.get("free_run", {})
     if not (before.get("horizons_s") and after.get("horizons_s") and diagnosis.findings):
         return []
+    file = f"{prefix}free-run-errors"
     return [
         {
-            "file": f"{prefix}free-run-errors",
-            "svg": figures.free_run_errors(_free_run(before), _free_run(after)),
+            "file": file,
+            "svg": drawings.of(file, figures.free_run_errors, _free_run(before), _free_run(after)),
             "caption": f"Root-mean-square error of {counted(before.get('starts', 0), 'free run')} on "
             "held-out data: each takes the "
             "measured state once and then only the measured actuator forces. New model: with the findings.",

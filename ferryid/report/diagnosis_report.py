@@ -26,9 +26,11 @@ from ferryid.report import second_sources
 from ferryid.report.diagnosis_page import MAX_LOGS, as_text, render
 from ferryid.report.diagnosis_timeline import timelines
 from ferryid.report.diagnosis_words import findings_of, findings_of_all
+from ferryid.report.drawings import NONE, Drawings
 from ferryid.report.folder import PAGE, made, write_folder
 from ferryid.report.interactive import make_interactive
 from ferryid.report.outcome import Report
+from ferryid.report.page_process import DrawingProcess, started
 from ferryid.types import AXES, RunContext
 from ferryid.vessel import load_profile, parse_profile
 from ferryid.vessel.profile import Profile
@@ -88,18 +90,25 @@ def diagnose_and_report(
     FerryIdError
         For input that cannot be used, and a folder that cannot be written.
     """
-    diagnoses = diagnose_and_store(logs, profile, settings, run, name=name)
-    run.progress("writing the report")
-    return report(diagnoses, run.out, command, run.tables_out)
+    with started(DrawingProcess) as process:
+        begin = None if process is None else process.begin
+        diagnoses = diagnose_and_store(logs, profile, settings, run, name=name, diagnosed=begin)
+        run.progress("writing the report")
+        drawings = NONE if process is None else Drawings(process.drawings(diagnoses))
+    return report(diagnoses, run.out, command, run.tables_out, drawings)
 
 
 def report(
-    diagnoses: Sequence[Diagnosis], out: Path, command: Sequence[str] = (), shared: Path | None = None
+    diagnoses: Sequence[Diagnosis],
+    out: Path,
+    command: Sequence[str] = (),
+    shared: Path | None = None,
+    drawings: Drawings = NONE,
 ) -> Report:
     """Write page, figures and JSON to a folder of their own in ``reports``; a later diagnosis of the same logs replaces it.
 
     `command` are the words that the diagnosis was asked for with; the page repeats them. `shared` is the output folder that
-    keeps the scripts of the interactive figures, where that is another than `out`.
+    keeps the scripts of the interactive figures, where that is another than `out`. `drawings` are those that exist already.
 
     Raises
     ------
@@ -111,10 +120,10 @@ def report(
         f" and {len(diagnoses) - 2} more" if len(diagnoses) > 2 else ""
     )
     interactive = make_interactive(timelines(diagnoses, MAX_LOGS), folder, shared or out)
-    page, drawings = render(diagnoses, f"{diagnoses[0].vessel} · {names}", made(command), interactive)
+    page, drawn = render(diagnoses, f"{diagnoses[0].vessel} · {names}", made(command), interactive, drawings)
     file = folder / PAGE
     plain = {**finite(as_json(diagnoses)), "report": str(file)}
-    write_folder(folder, page, drawings, plain, "diagnosis.json", scripts=interactive.files())
+    write_folder(folder, page, drawn, plain, "diagnosis.json", scripts=interactive.files())
     return Report(plain, f"{as_text(diagnoses)}\nreport  {file}", file)
 
 

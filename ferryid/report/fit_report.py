@@ -76,7 +76,7 @@ def fit_and_report(
     FerryIdError
         For unusable input or an output folder that cannot be written; nothing half-written is left.
     """
-    with started(page) as process:
+    with started(PageProcess, page) as process:
         return _reported(fit_logs(logs, profile, settings, run, name=name), run, page, process)
 
 
@@ -90,7 +90,7 @@ def fit_archive_and_report(
     page: bool = True,
 ) -> FitReport:
     """Fit a model to the block sums of the logs in the output folder, else as `fit_and_report`."""
-    with started(page) as process:
+    with started(PageProcess, page) as process:
         return _reported(fit_archive(profile, settings, run, logs, name=name), run, page, process)
 
 

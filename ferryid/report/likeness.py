@@ -9,6 +9,7 @@ import matplotlib as mpl
 from ferryid.counts import counted
 from ferryid.diagnose import Likeness, Pair, separation
 from ferryid.effects.wording import listed
+from ferryid.report.drawings import NONE, Drawings
 from ferryid.report.figures import MEASURED, STYLE, WIDTH, margins, svg_text
 from ferryid.report.heat_map import HeatCell, HeatMap
 
@@ -91,10 +92,12 @@ def heat_cells(likeness: Likeness) -> HeatMap:
     )
 
 
-def section(likeness: Likeness | None, file: str, where: str, *, drawn: bool = True) -> dict[str, Any]:
+def section(
+    likeness: Likeness | None, file: str, where: str, *, drawn: bool = True, drawings: Drawings = NONE
+) -> dict[str, Any]:
     """Return what a page shows of it; empty where no two effects can be compared.
 
-    `where` is "this log" or what else was looked at, for sentences.
+    `where` is "this log" or what else was looked at, for sentences; `drawings` are those that exist already.
     """
     if likeness is None or len(likeness.effects) < 2:
         return {}
@@ -106,7 +109,14 @@ def section(likeness: Likeness | None, file: str, where: str, *, drawn: bool = T
     return {
         "says": sentences(likeness, where),
         "rows": [_row(likeness, one) for one in likeness.alike],
-        "figures": [{"file": file, "svg": heat_map(likeness), "heat": heat_cells(likeness).plain(), "caption": caption}]
+        "figures": [
+            {
+                "file": file,
+                "svg": drawings.of(file, heat_map, likeness),
+                "heat": heat_cells(likeness).plain(),
+                "caption": caption,
+            }
+        ]
         if drawn
         else [],
     }

@@ -8,16 +8,21 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from ferryid.diagnose import Diagnosis
 from ferryid.identify import FitOutcome, FitSettings, fit_logs
-from ferryid.report import fit_report, page_process
+from ferryid.report import diagnosis_figures, figures, fit_report, page_process
+from ferryid.report.diagnosis_page import render
+from ferryid.report.drawings import Drawings
 from ferryid.report.page import Page, page_of
 from ferryid.types import RunContext
 from ferryid.vessel import load_profile
+from tests.report.test_diagnosis import diagnosis
 
 pytestmark = pytest.mark.slow
 
@@ -36,7 +41,7 @@ def process(monkeypatch: pytest.MonkeyPatch) -> Iterator[page_process.PageProces
     """Return one as the command line starts it on two cores."""
     monkeypatch.setattr(page_process, "_allowed", True)
     monkeypatch.setattr(page_process, "_cores", lambda: 2)
-    with page_process.started(True) as one:
+    with page_process.started(page_process.PageProcess) as one:
         assert one is not None
         yield one
 
@@ -80,6 +85,43 @@ def test_a_process_that_ends_at_its_request_makes_no_page(
     assert process.page_of(result, tmp_path / "page", tmp_path, command) is None
 
 
+def asked(monkeypatch: pytest.MonkeyPatch, one: Diagnosis, *, killed: bool = False) -> dict[str, dict[str, str]]:
+    """Return the drawings that a process makes of a diagnosis, by what is asked for after it has begun."""
+    monkeypatch.setattr(page_process, "_allowed", True)
+    monkeypatch.setattr(page_process, "_cores", lambda: 2)
+    with page_process.started(page_process.DrawingProcess) as process:
+        assert process is not None
+        if killed:
+            os.kill(process._process.pid, signal.SIGKILL)
+        process.begin((one,))
+        later = {
+            "same": (replace(one, notes=("learned",)),),
+            "other findings": (replace(one, findings=tuple(map(replace, one.findings))),),
+            "more": (one, one),
+        }
+        return {name: dict(process.drawings(some)) for name, some in later.items()}
+
+
+def test_a_second_process_draws_what_a_diagnosis_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    one = diagnosis("explained")
+    found = asked(monkeypatch, one)
+    assert found["same"] == render((one,), "trial")[1]
+    assert len(found["same"]) > 3
+    assert found["other findings"] == found["more"] == {}
+
+
+def test_where_the_process_was_killed_the_drawings_are_made_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert asked(monkeypatch, diagnosis("explained"), killed=True)["same"] == {}
+
+
+def test_a_page_takes_the_drawings_that_exist(monkeypatch: pytest.MonkeyPatch) -> None:
+    one = diagnosis("explained")
+    page, every = render((one,), "trial")
+    monkeypatch.setattr(figures, "svg_text", None)
+    monkeypatch.setattr(diagnosis_figures, "svg_text", None)
+    assert render((one,), "trial", drawings=Drawings(every)) == (page, every)
+
+
 def test_long_logs_are_not_handed_over(
     result: FitOutcome, process: page_process.PageProcess, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -89,16 +131,16 @@ def test_long_logs_are_not_handed_over(
 
 def test_it_is_started_for_the_command_line_alone_and_ends_with_the_fit(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(page_process, "_cores", lambda: 2)
-    with page_process.started(True) as one:
+    with page_process.started(page_process.PageProcess) as one:
         assert one is None
     for allowed, cores, wanted in ((True, 2, False), (False, 2, True), (True, 1, True)):
         monkeypatch.setattr(page_process, "_allowed", allowed)
         monkeypatch.setattr(page_process, "_cores", lambda cores=cores: cores)
-        with page_process.started(wanted) as one:
+        with page_process.started(page_process.PageProcess, wanted) as one:
             assert one is None
     monkeypatch.setattr(page_process, "_allowed", True)
     monkeypatch.setattr(page_process, "_cores", lambda: 2)
-    with page_process.started(True) as one:
+    with page_process.started(page_process.PageProcess) as one:
         assert one is not None
         assert one._process.poll() is None
     assert one._process.poll() is not None

@@ -32,6 +32,8 @@ from ferryid.types import AXES, Flags, Floats, RunContext, by_axis
 from ferryid.vessel.profile import Profile
 
 PREFIX = "Rejected: "
+MOST_ROWS_AT_ONCE = 750_000
+"""Rows of the logs, half a kilobyte each, of which two fits are made side by side; of more, one after the other."""
 
 
 @dataclass(frozen=True)
@@ -241,10 +243,9 @@ class Learner:
         return stored, Learned(verdict.accepted, said, verdict.reasons, by_axis(_over(after, known)), by_axis(over_fit))
 
     def _plain_and_remainder(self, base: Model) -> tuple[_Fitted, _Candidate]:
-        """Return the fit alone, and that to what a model leaves, made side by side."""
+        """Return the fit alone, and that to what a model leaves, made side by side unless their rows would fill the memory."""
         plain, left = list[_Fitted](), list[_Candidate]()
-        # Read before there are two that ask for them.
-        _ = self._opened
+        rows = sum(len(one.track.t) for one in self._opened)
 
         def make(alone: bool) -> None:
             if alone:
@@ -252,7 +253,7 @@ class Learner:
             else:
                 left.append(self._remainder(base))
 
-        over(make, (True, False))
+        over(make, (True, False), most=1 if rows > MOST_ROWS_AT_ONCE else None)
         return plain[0], left[0]
 
     def _remainder(self, base: Model) -> _Candidate:
