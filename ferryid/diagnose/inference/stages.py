@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 from ferryid.diagnose.checks.screening import ScreenedLog
@@ -132,4 +132,8 @@ def estimate(log: AveragedLog, baseline: Baseline) -> EstimatedLog:
 
 def select(log: EstimatedLog, progress: Callable[[str], None]) -> SelectedLog:
     """Select the effects that a log speaks for."""
-    return SelectedLog(log, search(log.problem, progress, known=log.expectation.library))
+    found = search(log.problem, progress, known=log.expectation.library)
+    if found.problem is not log.problem:
+        # What was worked out under the first noise is not asked for again: a copy has none of it.
+        log = replace(log, problem=replace(log.problem))
+    return SelectedLog(log, found)
