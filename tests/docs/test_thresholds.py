@@ -152,6 +152,7 @@ NO_DECISION = {
         identify.weak_rows _CHUNK_WINDOWS
         regression.test_function _CHUNK_WINDOWS
         identify.shared_rows MOST_ROWS
+        diagnose.judging.learning MOST_ROWS_AT_ONCE
         signals.kalman _LEAST_ROWS _FIT_ROWS
         signals.poses _STEPS_SAID
         signals.quality _MEDIAN_OF

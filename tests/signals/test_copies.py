@@ -8,7 +8,7 @@ from typing import cast
 import numpy as np
 import pytest
 
-from ferryid.signals.copies import same_recording
+from ferryid.signals.copies import same_recording, searchable
 from ferryid.signals.stream import Recording
 from ferryid.types import Floats
 
@@ -61,3 +61,12 @@ def test_without_a_position_velocities_count() -> None:
     swell = {"u": track(3)["x"], "v": track(3)["y"]}
     assert same_recording(recording(**swell), recording(**swell))
     assert not same_recording(recording(**swell), recording(**track(3)))
+
+
+def test_of_many_logs_the_copies_are_those_of_each_pair() -> None:
+    still = dict.fromkeys(("x", "y"), np.zeros(2000))
+    logs = [recording(**one) for one in (track(1), track(2), cut(track(1), slice(700, 1500)), still, {})]
+    found = searchable(logs)
+    pairs = [[one.same(other) for other in found] for one in found]
+    assert pairs == [[same_recording(one, other) for other in logs] for one in logs]
+    assert pairs[2] == [True, False, True, False, False]

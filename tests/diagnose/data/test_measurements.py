@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ferryid.diagnose.data.measurements import read_measurements, window_lengths
+from ferryid.diagnose.data.measurements import measure_log, read_measurements, window_lengths
+from ferryid.diagnose.data.simulated import simulated
 from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.effects.force_model import COEFFICIENTS, Measurements, acceleration
 from ferryid.effects.hull_spread import default_hull_spread
@@ -17,6 +18,8 @@ from ferryid.errors import FerryIdError
 from ferryid.models.forces.estimator import model_estimator
 from ferryid.models.model import Model
 from ferryid.regression.bases.basis import make_basis
+from ferryid.signals.stream import POSE_AND_VELOCITY
+from ferryid.types import IN_MEMORY
 from ferryid.vessel import load_profile
 from ferryid.vessel.wind import wind_force
 from tests.vessel.hull_matrices import forward
@@ -205,3 +208,19 @@ def test_a_tanker_with_propeller_and_rudder_is_measured(shared_data: Callable[[s
     np.testing.assert_allclose(measurements.parts.sum(axis=1)[rows], survey.motion.tau[rows], atol=1e-9)
     assert np.isnan(measurements.angles).all()
     assert np.isfinite(survey.hidden["wind"]).mean() > 0.9
+
+
+def test_a_log_of_a_campaign_keeps_what_is_needed_again_alone() -> None:
+    whole, survey = read_measurements(SHORT, FERRY)
+    kept = measure_log(SHORT, FERRY, IN_MEMORY)
+    np.testing.assert_array_equal(kept.measurements.nu, whole.nu)
+    assert kept.survey.motion is None
+    assert kept.survey.used == survey.used
+    assert survey.motion is not None
+    assert kept.survey.used.rows == np.count_nonzero(survey.motion.valid)
+    recording, streams = survey.recording, kept.survey.recording.streams
+    assert (kept.survey.recording.start_ns, kept.survey.recording.end_ns) == (recording.start_ns, recording.end_ns)
+    samples = {name: len(one.time_ns) for one in streams.values() for name in one.columns}
+    assert {"x", "y", "psi", "u", "v"} <= set(samples) <= set(POSE_AND_VELOCITY)
+    assert all(len(one.time_ns) <= 2 for one in streams.values() if not one.columns)
+    assert simulated(kept.survey.recording, whole) == simulated(recording, whole)
