@@ -103,12 +103,12 @@ class Conditions:
 class BlownLoad:
     """Wind load of one log as a function of its mean wind, with the gusts that were found."""
 
-    load: _Load
+    load: Load
     gusts: Floats
 
     def of(self, wind: Floats) -> Floats:
         """Return the load beyond that of still air under a mean wind (2,), shape (J, 3)."""
-        return self.load.of(wind + self.gusts)
+        return np.asarray(self.load.of(wind + self.gusts))
 
 
 @dataclass(frozen=True, eq=False)
