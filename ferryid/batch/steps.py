@@ -75,18 +75,14 @@ class Job:
 
 
 def _fitted(job: Job) -> FitSummary:
-    from ferryid.identify import load_block_sums, load_windows
+    from ferryid.identify import keep_for_archive
     from ferryid.report.fit_report import fit_and_report
 
     page = job.recipe.fit_report
     made = fit_and_report([job.log], job.profile, job.recipe.fit, job.context, name=job.model_name(), page=page)
     # What a fit over the whole archive adds up is made here, where logs are worked on side by side.
     if job.recorded.exists():
-        settings = job.recipe.fit.on(job.profile)
-        if settings.estimator == "weak":
-            load_windows(job.recorded, job.profile, settings, divided=settings.split == "blocks")
-        else:
-            load_block_sums(job.recorded, job.profile, settings, settings.windows_s or (settings.window_s,))
+        keep_for_archive(job.recorded, job.profile, job.recipe.fit)
     told, scores = made.json, finite(made.json["scores"])
     return FitSummary(
         model=job.below(told["model"]["path"]),

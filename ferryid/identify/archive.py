@@ -29,6 +29,7 @@ from ferryid.identify.pipeline import accept_estimate
 from ferryid.identify.settings import FOLDS, FitSettings, check_components
 from ferryid.identify.split import validation_blocks
 from ferryid.identify.weak_archive import fit_weak_archive
+from ferryid.identify.window_store import load_windows
 from ferryid.identify.windowed_data import NOT_RUN
 from ferryid.models import ForceScores, ModelScores, span_ranges
 from ferryid.models.prediction import FreeRun
@@ -317,6 +318,21 @@ def fit_archive(
         data = replace(data, settings=replace(settings, window_s=choice.window_s), window=choice.window)
     estimate = estimate_correction(data, int(components), settings.draws, run.progress)
     return accept_estimate(data, estimate, name, run)
+
+
+def keep_for_archive(folder: Path, profile: Profile, settings: FitSettings) -> None:
+    """Work out what a fit to an archive adds up of the log in a folder of ``out/logs``, and keep it there.
+
+    Raises
+    ------
+    FerryIdError
+        For a log that cannot be used, and a folder that cannot be written.
+    """
+    settings = settings.on(profile)
+    if settings.estimator == "weak":
+        load_windows(folder, profile, settings, divided=settings.split == "blocks")
+    else:
+        load_block_sums(folder, profile, settings, settings.windows_s or (settings.window_s,))
 
 
 def archive_folds(

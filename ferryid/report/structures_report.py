@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ferryid.errors import FerryIdError
-from ferryid.identify import FOLDS, TEST_WINDOW_S, FitSettings
+from ferryid.identify import FOLDS, FitSettings
 from ferryid.identify.sweeps import (
     BY,
     Ratios,
@@ -87,7 +87,7 @@ def render(
         axes=AXES,
         block_s=f"{found.block_s:.3g}",
         window_s=f"{found.settings.window_s:g}",
-        test_window_s=f"{TEST_WINDOW_S:g}",
+        test_window_s=f"{plain['test_window_s']:g}",
         settings=plain["settings"],
     )
     return page, drawings
