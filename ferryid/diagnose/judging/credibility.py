@@ -174,7 +174,7 @@ def interval_doubt(
         away = norm.ppf(0.975) * (np.array([one.value for one in told]) - neutral) / np.maximum(half, 1e-300)
         alike = covariance[np.ix_(sized, sized)] / np.outer(spread, spread)
         none = float(away @ np.linalg.solve(alike, away)) <= chi2.ppf(0.95, len(sized))
-    return "its 95 % interval holds none of it at all" if none else ""
+    return "its 95 % interval includes no effect at all" if none else ""
 
 
 def felt(made: CampaignFit, common: Floats, own: Floats) -> Floats:

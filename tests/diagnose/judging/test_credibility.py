@@ -192,7 +192,7 @@ def intervals(**ends: tuple[float, float]) -> dict[str, Estimate]:
     return {name: Estimate(0.5 * (low + high), low, high, "-") for name, (low, high) in ends.items()}
 
 
-NONE = "its 95 % interval holds none of it at all"
+NONE = "its 95 % interval includes no effect at all"
 
 
 @pytest.mark.parametrize(
@@ -278,7 +278,7 @@ def test_a_condition_that_makes_an_axis_worse_or_is_not_felt_is_not_confirmed() 
     assert "less than 2 %" in steady.value_doubt(1)
     # A log that may as well have none of it.
     steady.__dict__["fit"].condition = lambda i, k: (np.ones(2), np.eye(2))
-    assert steady.value_doubt(0) == "its 95 % interval holds none of it at all"
+    assert steady.value_doubt(0) == "its 95 % interval includes no effect at all"
 
 
 def test_one_axis_is_enough_to_be_felt() -> None:
