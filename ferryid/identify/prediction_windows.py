@@ -39,7 +39,7 @@ class PredictionWindows:
     motions, split
         The logs, and which of their rows train and validate.
     training_s
-        Length of the training windows [s]; None: that of the others, in which models are judged.
+        Length of the training windows [s]; None: that of the settings, or else of the others, in which models are judged.
     shared
         What folds and windows of other lengths have in common with these.
     """
@@ -54,13 +54,13 @@ class PredictionWindows:
 
     @cached_property
     def length_s(self) -> float:
-        """Length of a window [s]."""
-        return self.settings.weak_window_s or window_seconds(self.profile)
+        """Length of a window in which models are judged [s]: that of the vessel, whatever they are trained with."""
+        return window_seconds(self.profile)
 
     @property
     def training_length_s(self) -> float:
         """Length of a training window [s]."""
-        return self.training_s or self.length_s
+        return self.training_s or self.settings.weak_window_s or self.length_s
 
     @cached_property
     def training(self) -> tuple[WeakRows, ...]:

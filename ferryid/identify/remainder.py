@@ -132,7 +132,7 @@ def prediction_errors(
         Mean square error of each model, shape (3,) [N², N², (N·m)²], on the same windows; NaN where there is none.
     """
     mass = effective_mass(profile, settings.scale, (), np.zeros((0, 3)))
-    length_s = settings.weak_window_s or window_seconds(profile)
+    length_s = window_seconds(profile)
     squares = [[np.zeros((0, 3))] for _ in models]
     for one, wanted in zip(opened, rows, strict=True):
         prepared = smoothed(one, settings.window_s, settings.smoother, keep_track=True)

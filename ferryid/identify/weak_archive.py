@@ -41,7 +41,8 @@ def fit_weak_archive(
             "on them. Fix: give --window 1, or --estimator derivative"
         )
     where = archived_folders(run.tables or run.out, profile, names)
-    logs, functions = archived_windows(where, profile, settings, run.progress, divided=settings.split == "blocks")
+    usual = replace(settings, weak_window_s=None)
+    logs, functions = archived_windows(where, profile, usual, run.progress, divided=settings.split == "blocks")
     check_components(settings.components, functions)
     trained, validated = _divided(logs, settings.split)
     data = WindowedData.of(profile, settings, functions, logs, trained, validated)
@@ -52,8 +53,11 @@ def fit_weak_archive(
             f"{counted(judged, 'validation window')} of {data.windows.length_s:.3g} s. "
             "Fix: ingest more or longer logs, or give --estimator derivative"
         )
-    if settings.weak_window_s is None:
-        data = _with_best_length(data, where, run)
+    data = (
+        _with_best_length(data, where, run)
+        if settings.weak_window_s is None
+        else _of_length(data, where, settings.weak_window_s, run)
+    )
     run.progress("fitting")
     data.refuse_contradictions()
     estimate = estimate_correction(data, data.components(), settings.draws, run.progress)

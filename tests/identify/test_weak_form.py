@@ -317,7 +317,18 @@ def test_the_better_estimator_is_chosen_and_both_are_shown(monkeypatch: pytest.M
     assert chosen.chosen
     assert result.model.settings["estimator"] == chosen.name
     assert sum(one.chosen for one in by_name.values()) == 1
-    assert result.scores.measure == "prediction"
+    # Its held-out stretches are shorter than a window of the usual length, in which models are judged.
+    assert result.scores.measure == "force"
+
+
+def test_models_are_judged_in_windows_of_the_usual_length_whatever_they_are_trained_with() -> None:
+    logs = [measured(1, seconds=300.0)]
+    usual, longer = data_of(logs).windows, data_of(logs, weak_window_s=16.0).windows
+    assert usual.length_s == longer.length_s == pytest.approx(8.0, abs=0.5)
+    assert (usual.training_length_s, longer.training_length_s) == (usual.length_s, 16.0)
+    assert len(longer.training[0]) < len(usual.training[0])
+    assert len(longer.judged[0]) == len(usual.judged[0]) > 50
+    np.testing.assert_array_equal(longer.judged[0].force, usual.judged[0].force)
 
 
 @pytest.mark.parametrize(
