@@ -224,13 +224,19 @@ def _credibility(made: CampaignFit, candidate: Candidate, estimates: Mapping[str
     values = {name: one.value for name, one in estimates.items()}
     if doubt := value_doubt(candidate.effect, candidate.parameters, values, profile):
         return doubt
-    if doubt := interval_doubt(candidate.parameters, estimates):
+    if doubt := interval_doubt(candidate.parameters, estimates, _covariance(made, candidate)):
         return doubt
     if candidate.effect.scales and not made.campaign.hull.known and len(profile.actuators) == 1:
         return "without a hull model, a factor on the masses and the damping does the same as one on the only actuator"
     without = made.common.copy()
     without[property_rows(made.campaign, candidate)] = 0.0
     return unfelt(felt(made, without, made.own).max(axis=0))
+
+
+def _covariance(made: CampaignFit, candidate: Candidate) -> Floats:
+    """Return the covariance of a property's parameters up to the errors that are reported, shape (p, p)."""
+    rows, size = property_rows(made.campaign, candidate), np.array([one.size for one in candidate.parameters])
+    return np.asarray(made.normal.common_covariance[rows, rows] * np.outer(size, size))
 
 
 def _estimate(made: CampaignFit, candidate: Candidate) -> tuple[Floats, Floats]:

@@ -148,7 +148,9 @@ def interval_doubt(
     """Return that 95 % intervals hold none of an effect at all, as the end of a sentence; empty where they do not.
 
     Evidence says that something is better than nothing in its place; an interval says that this effect is. Places and times
-    have no size, as in `ferryid.diagnose.inference.estimation.Fit.reported_errors`.
+    have no size, as in `ferryid.diagnose.inference.estimation.Fit.reported_errors`. A place that is confined to a few of its
+    sizes, as that of a load to the hull, is taken as it is: no place on the hull makes up for a load of no mass, while a mooring
+    line without stiffness to a point far away is a steady force.
 
     Parameters
     ----------
@@ -158,7 +160,7 @@ def interval_doubt(
         Those that are reported, by name.
     covariance
         Of all parameters, shape (p, p), up to the errors that are reported: components such as north and east are judged by
-        their common 95 % region. Where None, by the interval of each.
+        their common 95 % region. Where None, by the interval of each, whatever else is confined.
     """
     sized = [k for k, one in enumerate(parameters) if one.name in estimates and one.unit == parameters[0].unit]
     told = [estimates[parameters[k].name] for k in sized]
@@ -167,14 +169,30 @@ def interval_doubt(
     if not sized:
         return ""
     none = all(inside)
-    if covariance is not None and len(sized) > 1 and (np.diag(covariance)[sized] > 0.0).all():
-        spread = np.sqrt(np.diag(covariance)[sized])
+    if covariance is not None and (np.diag(covariance)[sized] > 0.0).all():
+        confined = [
+            k for k, one in enumerate(parameters) if k not in sized and covariance[k, k] > 0.0 and _confined(one)
+        ]
         # An interval that ends where nothing acts is cut there: its other end tells the error.
         half = np.array([max(one.high - one.value, one.value - one.low) for one in told])
         away = norm.ppf(0.975) * (np.array([one.value for one in told]) - neutral) / np.maximum(half, 1e-300)
-        alike = covariance[np.ix_(sized, sized)] / np.outer(spread, spread)
+        spread = np.sqrt(np.diag(covariance)[sized])
+        alike = _given(covariance, sized, confined) / np.outer(spread, spread)
         none = float(away @ np.linalg.solve(alike, away)) <= chi2.ppf(0.95, len(sized))
     return "its 95 % interval includes no effect at all" if none else ""
+
+
+def _confined(one: Parameter) -> bool:
+    return one.high - one.low <= JUDGING.confined * one.size
+
+
+def _given(covariance: Floats, wanted: Sequence[int], known: Sequence[int]) -> Floats:
+    """Return the covariance of some parameters with others known, shape (wanted, wanted)."""
+    own = covariance[np.ix_(wanted, wanted)]
+    if not known:
+        return own
+    shared = covariance[np.ix_(wanted, known)]
+    return np.asarray(own - shared @ np.linalg.solve(covariance[np.ix_(known, known)], shared.T))
 
 
 def felt(made: CampaignFit, common: Floats, own: Floats) -> Floats:

@@ -166,6 +166,12 @@ class JudgingThresholds:
         "most that a placebo may have besides what it imitates of a condition that acts",
         "convention: a quarter, where a true condition leaves nothing, and a guessed hull that is off as much as for itself",
     )
+    confined: float = threshold(
+        10.0,
+        "of its usual size",
+        "range of a parameter up to which it is confined by the vessel",
+        "convention: places on a hull have 3 to 7, places anywhere and times hundreds",
+    )
     least_predicted: float = threshold(
         1e-3,
         "of the variance",

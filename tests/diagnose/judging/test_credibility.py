@@ -241,6 +241,24 @@ def test_a_wind_that_is_known_along_one_direction_alone_is_not_none() -> None:
     assert interval_doubt(wind, intervals(north=(0.4, 1.6), east=(-1.0, 1.0)), np.eye(len(wind))) == ""
 
 
+def test_a_load_whose_place_is_confined_to_the_hull_is_not_none_where_its_moment_is_known() -> None:
+    """The yaw moment of a load is its mass times its place: what is known is their product, which none has without mass."""
+    load = effects()["payload"].parameters_of(FERRY)
+    ends = intervals(mass=(-130.0, 850.0), x=(-0.2, 1.6))
+    names = [one.name for one in load]
+    covariance = np.diag([250.0**2, 0.46**2, *[0.0] * (len(load) - 2)])
+    assert names[:2] == ["mass", "x"]
+    assert interval_doubt(load, ends, covariance) == NONE
+    covariance[0, 1] = covariance[1, 0] = -0.95 * 250.0 * 0.46
+    assert interval_doubt(load, ends, covariance) == ""
+    # A line may lead to anywhere: what pulls alike everywhere is no line.
+    line = effects()["mooring"].parameters_of(FERRY)
+    ends = intervals(stiffness_north=(-0.1, 0.3), stiffness_east=(-0.1, 0.3), north=(-90.0, 30.0), east=(-90.0, 30.0))
+    covariance = np.diag([0.1**2, 0.1**2, 30.0**2, 30.0**2])
+    covariance[0, 2] = covariance[2, 0] = covariance[1, 3] = covariance[3, 1] = -0.95 * 3.0
+    assert interval_doubt(line, ends, covariance) == NONE
+
+
 def condition(axes: tuple[float, float, float], share: float) -> ConditionTest:
     """Return a wind that the evidence favours, with the errors that it leaves by axis, of one, and how much it is felt."""
     plain = SimpleNamespace(hull=np.array([1.0, 1.0, 0.0, 0.0, 1.0]), measurements=SimpleNamespace(profile=FERRY))
