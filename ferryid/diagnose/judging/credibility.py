@@ -149,8 +149,8 @@ def interval_doubt(
 
     Evidence says that something is better than nothing in its place; an interval says that this effect is. Places and times
     have no size, as in `ferryid.diagnose.inference.estimation.Fit.reported_errors`. A place that is confined to a few of its
-    sizes, as that of a load to the hull, is taken as it is: no place on the hull makes up for a load of no mass, while a mooring
-    line without stiffness to a point far away is a steady force.
+    sizes, as that of a load to the hull, is taken as it is: no place on the hull makes up for a load of no mass, while a line
+    without stiffness to a mooring far away is a steady force.
 
     Parameters
     ----------
