@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.data.estimate import Estimate
-from ferryid.diagnose.data.measurements import Survey
+from ferryid.diagnose.data.measurements import Survey, UsedRows
 from ferryid.diagnose.inference.campaign import CommonHull
 from ferryid.diagnose.inference.campaign_estimation import estimate_campaign
 from ferryid.diagnose.inference.campaign_properties import with_property
@@ -34,11 +34,9 @@ def campaign() -> JudgedCampaign:
 
 
 def survey() -> Survey:
-    rows = np.ones(4, dtype=bool)
-    motion = SimpleNamespace(log="log", valid=rows, rate_hz=2.0, nu=np.ones((4, 3)), nu_dot=np.ones((4, 3)))
-    return cast(
-        Survey, SimpleNamespace(motion=motion, repairs=(), recording=SimpleNamespace(sha256="ab", files=("log.mcap",)))
-    )
+    used = UsedRows("log", 4, 2.0, {"u": (0.0, 1.0), "v": (0.0, 1.0), "r": (0.0, 1.0)}, (), ())
+    recording = SimpleNamespace(sha256="ab", files=("log.mcap",))
+    return cast(Survey, SimpleNamespace(used=used, repairs=(), recording=recording))
 
 
 def wind(probability: float = 0.99, at: tuple[float, float] = (1.0, 1.0)) -> Any:
