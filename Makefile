@@ -65,7 +65,7 @@ attack: $(VENV)/installed
 
 # Fits and diagnoses of the real recordings, where they lie in ../shared/data; writes reports/real.md and reports/real.
 real: $(VENV)/installed
-	$(BIN)/python -m tests.real
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.real
 
 # Campaigns of the same recordings, with the wind withheld and in still air, groups of logs, other instruments: writes
 # reports/campaign.md.
