@@ -8,7 +8,7 @@ from typing import Any
 from ferryid.counts import counted
 from ferryid.diagnose.judging import Key
 from ferryid.effects import effects
-from ferryid.effects.wording import titled
+from ferryid.effects.wording import listed, titled
 from ferryid.planning.plan import Expected, Plan, Separated, Track
 
 SCHEMA = "ferryid.plan/1"
@@ -101,11 +101,13 @@ def summary(plan: Plan) -> str:
     generic = (
         " The profile has no hull model: a generic one of its dimensions was simulated." if plan.generic_hull else ""
     )
+    behind = [one.name for one in plan.hull if one.planned > one.usual]
+    less = f" After the usual trial {listed(behind)} would be known better." if behind else ""
     already = f", beside {counted(len(plan.after), 'log')} recorded already" if plan.after else ""
     return (
         f"Expected standard deviations of the hull's coefficients: {plan.mean_ratio:.2f} of those after {plan.usual} in "
         f"the geometric mean of {len(plan.hull)}, {plan.ratio:.2f} in the median{already}. They are for the noise of the "
-        f"simulator's sensors: they compare trials, and a recording will show larger ones.{worse}{generic}"
+        f"simulator's sensors: they compare trials, and a recording will show larger ones.{less}{worse}{generic}"
     )
 
 

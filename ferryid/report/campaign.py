@@ -108,11 +108,12 @@ def error_sentence(diagnoses: Sequence[Diagnosis]) -> str:
     for axis in AXES:
         values = [one[axis].value for one in ratios if axis in one]
         if values:
-            parts.append(f"{axis} {np.median(values):.2f} ({min(values):.2f} to {max(values):.2f})")
+            spread = f" ({min(values):.2f} to {max(values):.2f})" if len(values) > 1 else ""
+            parts.append(f"{axis} {np.median(values):.2f}{spread}")
     if not parts:
         return ""
-    over = counted(len(ratios), "log")
-    return f"Squared force error on held-out data, with the findings over without, median over {over}: {listed(parts)}."
+    over = f"median over {counted(len(ratios), 'log')}" if len(ratios) > 1 else "one log"
+    return f"Squared force error on held-out data, with the findings over without, {over}: {listed(parts)}."
 
 
 def flow_figure(diagnoses: Sequence[Diagnosis], effect: str) -> str:

@@ -141,6 +141,8 @@ def headline(result: ComparisonResult) -> str:
         return f"{counted(len(result.models), 'model')} by their coefficients alone: no log was given to judge them on."
     on, title, scope = known[-1]
     kind = _on_axes(result, on)
+    if not scope.windows and not any(isfinite(row.low) for row in result.statements if row.on == on):
+        return f"Too little data to compare the models, {title}: {scope.seconds:.0f} s, of which nothing is shown."
     groups: dict[tuple[str, str], list[str]] = {}
     for axis in AXES:
         rows = [row for row in result.statements if (row.on, row.kind, row.what) == (on, kind, axis)]

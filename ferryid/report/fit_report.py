@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ferryid.effects.wording import listed
 from ferryid.files import alone
 from ferryid.identify import FitOutcome, FitSettings, fit_archive, fit_logs
 from ferryid.models import model_to_json
@@ -198,7 +199,11 @@ def as_text(result: FitOutcome, stored: StoredModel, report: Path | None) -> str
         )
     lines.extend(f"wind, estimated: {one}" for one in result.winds)
     lines.extend(f"{one.title}, estimated: {one}" for one in result.conditions)
-    lines.extend([""] if result.estimators or result.winds or result.conditions else [])
+    if result.condition_kinds and not result.conditions:
+        # What each was left out for stands in the report.
+        left = listed([one.title for one in result.condition_kinds])
+        lines.append(f"conditions of single logs beside the wind: none estimated of {left}")
+    lines.extend([""] if result.estimators or result.winds or result.condition_kinds else [])
     lines.extend(f"warning: {warning}" for warning in result.warnings)
     state = "current" if stored.current else ("stored" if model.accepted else "stored, marked as rejected")
     if stored.current and stored.previous not in (None, model.version):

@@ -47,7 +47,8 @@ class GivenLogs:
         name, samples = recording.files[0], searchable([recording])[0]
         for other, sha256, known in self._known:
             if recording.sha256 == sha256:
-                raise FerryIdError(f"{name}: the same log as {other}, which would count twice. Fix: give it once")
+                what = "given twice, and" if name == other else f"the same log as {other}, which"
+                raise FerryIdError(f"{name}: {what} would count twice. Fix: give it once")
             if samples.same(known):
                 raise FerryIdError(
                     f"{name}: holds the recording of {other}, or a piece of it, which would count twice. "

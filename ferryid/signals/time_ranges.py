@@ -145,8 +145,9 @@ def spans_of(log: str, start: int, end: int, ranges: TimeRanges) -> Spans:
                 f"{_clock(start, end)}. Fix: correct --from and --to"
             )
         if first >= last:
+            why = "is empty" if first == last else "ends before it begins"
             raise RangeError(
-                f"{log}: the range {_words(asked)} ends before it begins, found {_relative(first, start)} to "
+                f"{log}: the range {_words(asked)} {why}, found {_relative(first, start)} to "
                 f"{_relative(last, start)} of the log. Fix: correct --from and --to"
             )
         found.append((max(first, start), min(last, end)))

@@ -181,7 +181,7 @@ def test_a_log_given_twice(
     # By its bare name too, of which Python keeps one copy.
     monkeypatch.chdir(fixtures)
     log = "short.mcap"
-    refused(ferryid(*command, log, log, "--vessel", "milliampere", "--out", tmp_path), "the same log as short.mcap")
+    refused(ferryid(*command, log, log, "--vessel", "milliampere", "--out", tmp_path), "short.mcap: given twice")
 
 
 def profile_with(tmp_path: Path, old: str, new: str) -> Path:
@@ -310,7 +310,7 @@ def test_json_is_never_written_over_an_input(ferryid, fixtures: Path, tmp_path: 
 @pytest.mark.slow
 def test_the_same_log_twice(ferryid, fixtures: Path, tmp_path: Path) -> None:
     log = fixtures / "short.bag"
-    refused(ferryid("fit", log, log, "--vessel", "milliampere", "--out", tmp_path, "--split", "logs"), "the same log")
+    refused(ferryid("fit", log, log, "--vessel", "milliampere", "--out", tmp_path, "--split", "logs"), "given twice")
 
 
 @pytest.mark.slow
@@ -360,7 +360,7 @@ def test_comparisons_that_mean_nothing(ferryid, fixtures: Path, tmp_path: Path) 
     refused(ferryid("compare", "milliampere@1", "--on", log, *out), "two or more models")
     refused(ferryid("compare", "--on", log, "milliampere@1", "milliampere@2", *out), "ferryid compare --help")
     refused(ferryid("compare", "milliampere@1", "milliampere@7", *out), "no such version")
-    refused(ferryid(*pair, "--on", log, log, *out), "short.mcap", "the same log")
+    refused(ferryid(*pair, "--on", log, log, *out), "short.mcap", "given twice")
     refused(ferryid(*pair, "--on", tmp_path / "none.bag", *out), "none.bag")
     refused(ferryid(*pair, "--on", log, "--vessel", "gunnerus", *out), "gunnerus")
     refused(ferryid(*pair, "--on", log, "--window", "70", *out), "--window")

@@ -232,7 +232,7 @@ def test_a_force_without_bounds_is_refused(folder: Path) -> None:
 
 def test_a_log_is_given_once(field: CandidateSet, folder: Path) -> None:
     log = logs_in(folder)[0]
-    with pytest.raises(FerryIdError, match=r"the same log as .*trial-0\.mcap, which would count twice"):
+    with pytest.raises(FerryIdError, match=r"trial-0\.mcap: given twice, and would count twice\. Fix: "):
         compare(field, [log, log], RunContext(folder / "out"))
 
 

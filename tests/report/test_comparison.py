@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import inf, isnan, nan
 
 import numpy as np
@@ -137,6 +138,13 @@ def test_without_a_window_the_force_in_single_rows_is_what_counts() -> None:
     said = comparison_words.sentences(found, "log")
     assert len(said) == 5
     assert any(one.startswith("two is better than one on surge (p 0.003): its MSE is") for one in said)
+
+
+def test_without_a_window_and_an_interval_nothing_is_advised() -> None:
+    found = result(("one", "two", BASE), 0.4, windows=0)
+    none = tuple(replace(row, low=nan, high=nan, p=nan, p_corrected=nan) for row in found.statements)
+    headline = comparison_words.headline(replace(found, statements=none))
+    assert headline == "Too little data to compare the models, log: 1 s, of which nothing is shown."
 
 
 def test_too_few_blocks_are_too_little_data() -> None:

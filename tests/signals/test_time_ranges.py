@@ -114,6 +114,7 @@ def test_a_time_of_day_after_midnight_is_of_the_next_day(whole: Recording, profi
         ((None, "-200"), "is outside the log"),
         (("12:00", None), "is outside the log"),
         (("50", "20"), r"ends before it begins, found 50\.0 s to 20\.0 s"),
+        (("50", "50"), r"is empty, found 50\.0 s to 50\.0 s"),
     ],
 )
 def test_a_range_that_a_log_does_not_have(whole: Recording, profile: Profile, asked: tuple, told: str) -> None:
