@@ -79,10 +79,25 @@ def angle(a: float, b: float) -> float:
     return float(math.pi - found if b < 0.0 else found)
 
 
+@borrowing
+def load_at(
+    c: float, s: float, u: float, v: float, north: float, east: float, shape: Shape
+) -> tuple[float, float, float]:
+    """Return the load [N, N, N·m] of a wind to north and east [m/s] on a heading with cosine and sine c and s."""
+    longitudinal, transverse, oblique, lever, moved = shape
+    # Velocity relative to the air.
+    ahead, aside = u - (c * north + s * east), v - (c * east - s * north)
+    square = ahead * ahead + aside * aside
+    sin_2gamma = np.divide(2.0 * ahead * aside, max(square, LEAST))
+    pressure = np.divide(-math.sqrt(square), 1.0 - oblique * (sin_2gamma * sin_2gamma))
+    push = transverse * pressure * aside
+    turn = (lever + moved * (0.5 * math.pi - angle(abs(aside), ahead))) * push
+    return longitudinal * pressure * ahead, push, turn
+
+
 @compiled
 def weighed_loads(winds: Floats, weights: Floats, cosine: Floats, sine: Floats, nu: Floats, shape: Shape) -> Floats:
     """Return `steady_wind_force`."""
-    longitudinal, transverse, oblique, lever, moved = shape
     n = nu.shape[0]
     out = np.empty((n, 3))
     u, v, X, Y, N = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK)
@@ -95,15 +110,10 @@ def weighed_loads(winds: Floats, weights: Floats, cosine: Floats, sine: Floats, 
         for w in range(winds.shape[0]):
             north, east, weight = winds[w, 0], winds[w, 1], weights[w]
             for i in range(rows):
-                # Velocity relative to the air.
-                ahead, aside = u[i] - (c[i] * north + s[i] * east), v[i] - (c[i] * east - s[i] * north)
-                square = ahead * ahead + aside * aside
-                sin_2gamma = np.divide(2.0 * ahead * aside, max(square, LEAST))
-                pressure = np.divide(-math.sqrt(square), 1.0 - oblique * (sin_2gamma * sin_2gamma))
-                push = transverse * pressure * aside
-                X[i] += weight * (longitudinal * pressure * ahead)
-                Y[i] += weight * push
-                N[i] += weight * ((lever + moved * (0.5 * math.pi - angle(abs(aside), ahead))) * push)
+                x, y, turn = load_at(c[i], s[i], u[i], v[i], north, east, shape)
+                X[i] += weight * x
+                Y[i] += weight * y
+                N[i] += weight * turn
         for i in range(rows):
             out[first + i, 0], out[first + i, 1], out[first + i, 2] = X[i], Y[i], N[i]
     return out

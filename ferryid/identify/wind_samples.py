@@ -5,12 +5,10 @@ The same sums as `ferryid.vessel.wind.relative_wind_force` gives, to the last di
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from ferryid.compiled import compiled
-from ferryid.effects.wind_loads import LEAST, Shape, angle
+from ferryid.effects.wind_loads import Shape, load_at
 from ferryid.types import Floats
 
 
@@ -33,7 +31,6 @@ def mean_loads(
     shape
         See `ferryid.effects.wind_loads`.
     """
-    longitudinal, transverse, oblique, lever, moved = shape
     J, S = cosine.shape
     out = np.empty((winds.shape[0], J, 3))
     X, Y, N = np.empty(S), np.empty(S), np.empty(S)
@@ -42,15 +39,7 @@ def mean_loads(
         for w in range(winds.shape[0]):
             north, east = winds[w, j, 0], winds[w, j, 1]
             for i in range(S):
-                # Velocity relative to the air.
-                ahead, aside = u[i] - (c[i] * north + s[i] * east), v[i] - (c[i] * east - s[i] * north)
-                square = ahead * ahead + aside * aside
-                sin_2gamma = np.divide(2.0 * ahead * aside, max(square, LEAST))
-                pressure = np.divide(-math.sqrt(square), 1.0 - oblique * (sin_2gamma * sin_2gamma))
-                push = transverse * pressure * aside
-                X[i] = longitudinal * pressure * ahead
-                Y[i] = push
-                N[i] = (lever + moved * (0.5 * math.pi - angle(abs(aside), ahead))) * push
+                X[i], Y[i], N[i] = load_at(c[i], s[i], u[i], v[i], north, east, shape)
             x = y = n = 0.0
             for i in range(S):
                 x += weights[i] * X[i]

@@ -139,11 +139,13 @@ def estimate(one: Estimate) -> str:
 
 
 def digits_of(one: Estimate) -> int:
-    """Return the decimals of a value that its interval supports; a whole number that is counted has none."""
+    """Return the decimals of a value that its interval supports, of three digits without one; a whole number has none."""
     width = one.high - one.low
     if width == 0.0 and float(one.value).is_integer():
         return 0
-    return min(max(1 - _exponent(width), 0), 6) if isfinite(width) and width > 0.0 else 3
+    if isfinite(width) and width > 0.0:
+        return min(max(1 - _exponent(width), 0), 6)
+    return min(max(2 - _exponent(one.value), 0), 6) if isfinite(one.value) else 0
 
 
 def measured(value: float | None, unit: str) -> str:

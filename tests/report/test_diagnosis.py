@@ -713,3 +713,10 @@ def test_a_law_is_in_the_json(tmp_path: Path) -> None:
             "says": "in sway -34 N",
         }
     ]
+
+
+@pytest.mark.parametrize(
+    ("value", "told"), [(17.683, "17.7 N"), (0.01234, "0.0123 N"), (4.0, "4 N"), (1234.5, "1234 N")]
+)
+def test_a_value_without_an_interval_has_three_digits(value: float, told: str) -> None:
+    assert estimate(Estimate(value, value, value, "N")) == told
