@@ -137,6 +137,10 @@ class FitData(ABC):
         """Return the coefficients nearest to estimated ones, (K, 3), that physics allows; None: they stay as they are."""
         return None
 
+    def undivided(self) -> FitData | None:
+        """Return the same data of which all rows train, for the coefficients that are stored; None: the training rows' are."""
+        return None
+
     def combined(self, found: Coefficients) -> Coefficients:
         """Return the coefficients of the new model: those found on top of what was there before."""
         return found

@@ -203,8 +203,11 @@ class FitOutcome:
     ----------
     model, acceptance
         The model, not stored yet, and whether it may replace the base model.
+    judged
+        The model from the training rows alone, on which the scores and the verdict are; `model` is from all rows where blocks
+        were held out of the weak form, else the same.
     scores
-        The model's scores.
+        Scores of `judged`.
     curve
         Force error against the number of components.
     excitation
@@ -228,6 +231,7 @@ class FitOutcome:
     """
 
     model: Model
+    judged: Model
     acceptance: Acceptance
     scores: ModelScores
     curve: ComponentCurve

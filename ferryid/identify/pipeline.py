@@ -13,7 +13,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from ferryid import __version__
-from ferryid.identify.acceptance import NOT_JUDGED, Acceptance, Check, accept
+from ferryid.identify.acceptance import NOT_JUDGED, Acceptance, accept
 from ferryid.identify.estimation import estimate_correction
 from ferryid.identify.estimators import choose_estimator
 from ferryid.identify.excitation import still_axes
@@ -36,7 +36,6 @@ from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.weak_data import WeakData, weak_data
 from ferryid.identify.window_length import with_best_length
 from ferryid.models import Model, ModelScores
-from ferryid.models.prediction import FreeRun
 from ferryid.models.store import check_name
 from ferryid.regression.bases import Basis
 from ferryid.signals.prepare import Opened, smoothed
@@ -77,8 +76,7 @@ def fit_opened(
 ) -> FitOutcome:
     """Fit a correction of a profile's hull to logs that were read and aligned; arguments and errors as of `fit_logs`."""
     chosen = estimator_for(opened, profile, settings, run)
-    estimate = estimate_correction(chosen.data, chosen.components, settings.draws, run.progress)
-    outcome = accept_estimate(chosen.data, estimate, name, run)
+    outcome = fit_and_judge(chosen.data, chosen.components, name, run)
     told = (f"The derivative's estimator was used: {chosen.why}.",) if chosen.why else ()
     return replace(outcome, warnings=(*outcome.warnings, *chosen.notes, *told), estimators=chosen.scores)
 
@@ -177,10 +175,40 @@ def _choose_data(data: LogData, training: Sequence[Flags], opened: Sequence[Open
     return ChosenData(chosen, components["weak" if isinstance(chosen, WeakData) else "derivative"], scores)
 
 
-def accept_estimate(data: FitData, estimate: Estimate, name: str, run: RunContext) -> FitOutcome:
-    """Judge an estimated correction, and return it as a model with all that was found out about it."""
+def fit_and_judge(data: FitData, components: int, name: str, run: RunContext) -> FitOutcome:
+    """Estimate a correction from the training rows and judge it; where blocks were held out, the model is of all rows then.
+
+    The verdict is on the estimate that has not seen the held-out rows. Number of components, window length and conditions that
+    were chosen without them stay.
+    """
+    undivided, draws = data.undivided(), data.settings.draws
+    if undivided is None:
+        return accept_estimate(data, estimate_correction(data, components, draws, run.progress), name, run)
+    judged = estimate_correction(data, components, 0, run.progress)
+    run.progress("fitting to all rows")
+    return accept_estimate(
+        data, judged, name, run, (undivided, estimate_correction(undivided, components, draws, run.progress))
+    )
+
+
+def accept_estimate(
+    data: FitData, estimate: Estimate, name: str, run: RunContext, whole: tuple[FitData, Estimate] | None = None
+) -> FitOutcome:
+    """Judge an estimated correction, and return it as a model with all that was found out about it.
+
+    Parameters
+    ----------
+    data, estimate
+        The data, and what was estimated from the training rows.
+    name, run
+        Of the model; progress.
+    whole
+        The same data of which all rows train, and the estimate from them that is to be stored; None: `estimate` is.
+    """
     run.progress("judging")
     found = data.combined(estimate.coefficients)
+    told, final = whole or (data, estimate)
+    stored = told.combined(final.coefficients)
     logs = data.log_fits(found)
     scores = data.scores(found, logs)
     excitation = data.excitation(estimate)
@@ -189,9 +217,21 @@ def accept_estimate(data: FitData, estimate: Estimate, name: str, run: RunContex
     if data.held_out:
         acceptance = accept(scores.force.mse_base, scores.force.mse_model, scores.measure, data.settings.axes)
     if data.held_out and data.settings.accept == "full":
-        acceptance = acceptance.with_checks(_checks(data, found, scores, free_base, free_new))
+        acceptance = acceptance.with_checks(
+            (
+                *physical_checks(told, stored),
+                *free_run_checks(free_base, free_new),
+                *held_out_checks(scores.seconds, data.held_out_blocks, scores.split),
+            )
+        )
+    judged = _model(data, estimate, found, name, scores, acceptance, excitation)
+    model = judged
+    if whole is not None:
+        model = _model(told, final, stored, name, scores, acceptance, told.excitation(final))
+        model = replace(model, settings={**model.settings, "refitted": True})
     return FitOutcome(
-        model=_model(data, estimate, found, name, scores, acceptance, excitation),
+        model=model,
+        judged=judged,
         acceptance=acceptance,
         scores=scores,
         curve=_component_curve(data, estimate, scores),
@@ -199,27 +239,16 @@ def accept_estimate(data: FitData, estimate: Estimate, name: str, run: RunContex
         free_run_base=free_base,
         free_run_model=free_new,
         warnings=(
-            *estimate.held,
+            *final.held,
             *data.warnings(excitation, scores),
             *free_run_warnings(free_base, free_new),
-            *estimate.notes,
+            *final.notes,
         ),
         logs=logs,
         archive=data.archived_logs(found),
-        winds=data.winds,
-        conditions=data.log_conditions,
+        winds=told.winds,
+        conditions=told.log_conditions,
         condition_kinds=data.condition_kinds,
-    )
-
-
-def _checks(
-    data: FitData, found: Coefficients, scores: ModelScores, free_base: FreeRun, free_new: FreeRun
-) -> tuple[Check, ...]:
-    """Return what the full criterion asks for besides the held-out error."""
-    return (
-        *physical_checks(data, found),
-        *free_run_checks(free_base, free_new),
-        *held_out_checks(scores.seconds, data.held_out_blocks, scores.split),
     )
 
 

@@ -130,6 +130,9 @@ class WindowedData(WeakData):
             validated=tuple(self.validated[k] for k in places),
         )
 
+    def undivided(self) -> None:
+        """Return none: of validation rows no windows as long as those that train are kept."""
+
     @property
     def where(self) -> str:
         """Name of the first log, for messages."""

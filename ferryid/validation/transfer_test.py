@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
 
@@ -31,6 +31,52 @@ HORIZON_S = 60.0
 Rows = NDArray[np.bool_]
 
 
+@dataclass(frozen=True, eq=False)
+class Transfer:
+    """What all models expect of the second log.
+
+    Attributes
+    ----------
+    second
+        The log.
+    base, found
+        What the base model expects, and every other by its name.
+    known
+        What is known of each method beside its errors.
+    rows
+        Rows that all can predict, shape (n,): nobody gains by what it cannot.
+    length_s
+        Length of the windows that errors are averaged over [s].
+    """
+
+    second: Prepared
+    base: Prediction
+    found: Mapping[str, Prediction]
+    known: Mapping[str, TransferScore]
+    rows: Rows
+    length_s: float
+
+    def scores(self, mass: Floats) -> TransferResult:
+        """Return the scores of all models; `mass` makes a force of an acceleration, shape (3, 3)."""
+        motion, rows, base = self.second.motion, self.rows, self.base
+        base_run = base.free_run(rows)
+
+        def in_windows(prediction: Prediction) -> Floats:
+            seen = prediction.motion
+            errors = (seen.nu_dot - predicted_acceleration(prediction.force, seen)) @ mass.T
+            return _power(window_errors(errors, rows, motion.rate_hz, self.length_s))
+
+        base_windows = in_windows(base)
+        scores = {}
+        for name, known in self.known.items():
+            found = self.found.get(name)
+            one = _score(motion.tau, base.tau, found, rows, base_run, known)
+            scores[name] = one if found is None else replace(one, windows=_by_axis(in_windows(found) / base_windows))
+        return TransferResult(
+            replace(_base_score(motion.tau, base, rows, base_run), windows=_by_axis(base_windows)), scores
+        )
+
+
 def transfer_test(
     first_log: str,
     transfer_log: str,
@@ -46,6 +92,22 @@ def transfer_test(
     measured forces, and where the vessel goes in 60 s under them. The free runs of all take forces from outside as they were
     along the measured path. In windows the error is the acceleration's times the mass in the profile, the same for all: a
     model that takes the thrusters for half as strong and the hull for half as heavy moves alike, with half the force error.
+
+    Arguments and errors as of `transfer`.
+    """
+    return transfer(first_log, transfer_log, profile, out, diagnosed=diagnosed, rivals=rivals).scores(profile.hull.M)
+
+
+def transfer(
+    first_log: str,
+    transfer_log: str,
+    profile: Profile,
+    out: Path,
+    *,
+    diagnosed: Model | str | Path | None,
+    rivals: Mapping[str, Learner] = RIVALS,
+) -> Transfer:
+    """Return what the base model, a diagnosed one and every rival expect of another log of the truth that they were fitted to.
 
     Parameters
     ----------
@@ -74,7 +136,6 @@ def transfer_test(
         )
     base = base_of(other, profile).prediction
     found: dict[str, Prediction] = {}
-    # What is known of each method beside its errors.
     known: dict[str, TransferScore] = {}
     if diagnosed is None:
         found[DIAGNOSED] = base
@@ -92,28 +153,8 @@ def transfer_test(
             known[name] = TransferScore({}, why=str(error))
             continue
         known[name] = TransferScore({}, names=learnt.names)
-    motion = other.motion
-    # On the same rows for all, so that nobody gains by what it cannot predict.
-    rows = usable_rows(motion, base.tau, *(each.tau for each in found.values()))
-    base_run = base.free_run(rows)
-    length_s = window_seconds(profile)
-
-    def in_windows(prediction: Prediction) -> Floats:
-        seen = prediction.motion
-        errors = (seen.nu_dot - predicted_acceleration(prediction.force, seen)) @ profile.hull.M.T
-        return window_errors(errors, rows, motion.rate_hz, length_s)
-
-    base_windows = _power(in_windows(base))
-    scores = {name: _score(motion.tau, base.tau, found.get(name), rows, base_run, more) for name, more in known.items()}
-    return TransferResult(
-        replace(_base_score(motion.tau, base, rows, base_run), windows=_by_axis(base_windows)),
-        {
-            name: replace(one, windows=_by_axis(_power(in_windows(found[name])) / base_windows))
-            if name in found
-            else one
-            for name, one in scores.items()
-        },
-    )
+    rows = usable_rows(other.motion, base.tau, *(each.tau for each in found.values()))
+    return Transfer(other, base, found, known, rows, window_seconds(profile))
 
 
 def window_errors(errors: Floats, rows: Rows, rate_hz: float, length_s: float) -> Floats:

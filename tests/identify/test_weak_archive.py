@@ -22,6 +22,7 @@ from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.split import split_rows
 from ferryid.identify.thresholds import IDENTIFY
+from ferryid.identify.weak_data import WeakData
 from ferryid.identify.weak_rows import WeakRows
 from ferryid.identify.windowed_data import WindowedData
 from ferryid.models.model import model_to_json
@@ -105,7 +106,10 @@ def test_of_short_logs_the_second_and_fifth_validate_as_in_a_fit_to_the_logs() -
 @pytest.mark.parametrize(
     "change", [{}, {"components": 5, "structure": "coupled"}, {"weak_window_s": 5.0, "window_s": 2.0}]
 )
-def test_the_same_as_a_fit_to_the_logs(logs: list[str], season: Path, change: dict[str, Any]) -> None:
+def test_the_same_as_a_fit_to_the_training_rows_of_the_logs(
+    logs: list[str], season: Path, change: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(WeakData, "undivided", lambda _: None)
     settings = replace(SETTINGS, **change)
     rows = fit_logs(logs, PROFILE, settings, RunContext(season))
     for _ in range(2):  # made, and read

@@ -8,9 +8,12 @@ from typing import Any
 
 import pytest
 
+from ferryid.validation.log_generation import generate
 from ferryid.validation.records import DIAGNOSED, StoredEffectNote, TransferResult, TransferScore
+from ferryid.validation.transfer_test import transfer
+from ferryid.vessel import load_profile
 from tests.rivals import second_logs
-from tests.rivals.second_logs import FIT, cases, force_error, position_error, section, targets
+from tests.rivals.second_logs import FIT, cases, force_error, position_error, section, targets, true_starts
 
 
 def score(force: float | None, position_m: float | None, diverged: int = 0) -> TransferScore:
@@ -25,7 +28,12 @@ def result(*known: str, **methods: TransferScore) -> dict[str, Any]:
     ours = replace(methods["ours"], effects=tuple(StoredEffectNote(one, None, "") for one in known))
     methods = {**methods, "ours": ours}
     named = {DIAGNOSED: methods["ours"], FIT: methods["fit"], "stepwise": methods["stepwise"]}
-    return {"cell": "wind", "concealed": ["wind"], **TransferResult(score(100.0, 4.0), named).to_json()}
+    # From true states ours errs half as much, and nobody else otherwise.
+    true = {
+        name: one.position_m and one.position_m * (0.5 if name == DIAGNOSED else 1.0) for name, one in named.items()
+    }
+    plain = TransferResult(score(100.0, 4.0), named).to_json()
+    return {"cell": "wind", "concealed": ["wind"], "true_starts_m": true, **plain}
 
 
 FOUND = [
@@ -55,8 +63,10 @@ def test_aims_compare_with_rivals_and_the_best_with_all() -> None:
 
 def test_the_table_has_every_model() -> None:
     text = "\n".join(section(FOUND))
-    assert "| diagnosed and learnt (`diagnose`) | 0.52 | 0.57 | 0.75 | 1.00 | 67 % | 33 % | 0 |" in text
-    assert "| stepwise | 0.70 | 0.77 | 0.50 | 0.50 | 33 % | 33 % | 1 |" in text
+    assert "| diagnosed and learnt (`diagnose`) | 0.52 | 0.57 | 0.75 | 1.00 | 67 % | 33 % | 67 % | 0 |" in text
+    assert "| stepwise | 0.70 | 0.77 | 0.50 | 0.50 | 33 % | 33 % | 33 % | 1 |" in text
+    # Ours over stepwise: 0.5 / 2.0, 1.5 / 0.1, 1.5 / 2.0.
+    assert "best or within 5 % on 67 % of the logs, and its position error is 0.75 of the best rival's" in text
 
 
 def test_each_log_says_what_was_concealed_and_how_the_diagnosed_model_stands() -> None:
@@ -67,6 +77,23 @@ def test_each_log_says_what_was_concealed_and_how_the_diagnosed_model_stands() -
     assert lines[-1].startswith(
         "On 1 log another model has the least force error; in 1 of them the diagnosed one lacks some"
     )
+
+
+@pytest.mark.slow
+def test_free_runs_from_true_states_are_those_of_a_log_without_noise(tmp_path: Path) -> None:
+    quiet = replace(cases()[0], truths=(), conditions={"noise": 0.0}, hull_factors={})
+    first, second = generate(quiet, tmp_path), generate(quiet, tmp_path / "second", transfer=True)
+    profile = load_profile(first.profile)
+    found = transfer(str(first.log), str(second.log), profile, tmp_path / "out", diagnosed=None, rivals={})
+    ran = found.scores(profile.hull.M).methods[DIAGNOSED].position_m
+    assert ran == pytest.approx(true_starts(found, quiet)[DIAGNOSED], rel=0.05, abs=0.02)
+    noisy = replace(quiet, conditions={"noise": 3.0})
+    worse = generate(noisy, tmp_path / "noisy", transfer=True)
+    found = transfer(str(first.log), str(worse.log), profile, tmp_path / "out", diagnosed=None, rivals={})
+    error = found.scores(profile.hull.M).methods[DIAGNOSED].position_m
+    assert error is not None
+    assert true_starts(found, noisy)[DIAGNOSED] == pytest.approx(ran, rel=0.3)
+    assert error > 1.5 * ran  # type: ignore[operator]
 
 
 def test_the_draw_is_the_same_every_time() -> None:

@@ -91,9 +91,10 @@ class _Fitted:
 
 @dataclass(frozen=True)
 class _Candidate:
-    """A model with a correction on top, and the fit of that correction."""
+    """A model with a correction on top, to be stored and as it was judged, and the fit of that correction."""
 
     model: Model
+    judged: Model
     fitted: _Fitted
 
     @property
@@ -164,9 +165,9 @@ class Learner:
         sure = _confirmed(unseen)
         found = self._remainder(unseen)
         plain = self._plain.outcome
-        beside = self._remainder(sure).model if _effects(sure) else plain.model
+        beside = self._remainder(sure).judged if _effects(sure) else plain.judged
         rows = _both(self._plain, found.fitted)
-        compared = [start, beside, plain.model, unseen, found.model]
+        compared = [start, beside, plain.judged, unseen, found.judged]
         base, without, fitted, bare, after = self._errors(compared, rows)
         verdict, change = _judged(found.outcome, bare, after), _over(after, without)
         if not (verdict.accepted and accept(without, after, "prediction").accepted):
@@ -216,13 +217,13 @@ class Learner:
         start = self.start or blank_model(self.profile, base.name)
         alone, found = self._plain_and_remainder(base)
         plain, rows = alone.outcome, _both(alone, found.fitted)
-        before, known, after, fitted = self._errors([start, base, found.model, plain.model], rows)
+        before, known, after, fitted = self._errors([start, base, found.judged, plain.judged], rows)
         verdict, what = _judged(found.outcome, known, after), "A correction learned on top of the findings"
         best = after if verdict.accepted else known
         if diagnosed is not None and plain.acceptance.accepted and _fit_is_better(best, fitted):
             # The refit of the diagnosis may be to blame: what was named stays, the hull is the fit's to estimate.
             other = self._remainder(replace(base, hull=start.hull))
-            second = self._errors([base, other.model], rows)[1]
+            second = self._errors([base, other.judged], rows)[1]
             new = _judged(other.outcome, known, second)
             if new.accepted and float(np.mean(_over(second, best))) < 1.0:
                 found, after, verdict, best = other, second, new, second
@@ -258,7 +259,8 @@ class Learner:
 
     def _remainder(self, base: Model) -> _Candidate:
         outcome = fit_remainder(base, self._opened, self.profile, self.settings, self.run)
-        return _Candidate(with_remainder(base, outcome.model), _Fitted.of(outcome))
+        model, judged = (with_remainder(base, one) for one in (outcome.model, outcome.judged))
+        return _Candidate(model, judged, _Fitted.of(outcome))
 
     def _errors(self, models: Sequence[Model], rows: Sequence[Flags]) -> list[Floats]:
         return prediction_errors(models, self._opened, self.profile, self.settings, rows)
