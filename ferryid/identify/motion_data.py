@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -190,6 +190,13 @@ class LogData(MotionData):
         if thesis or sum(len(one) for one in self.windows.judged) < IDENTIFY.fewest_judged:
             return super().scores(found, logs)
         return self.windows.scores(found)
+
+    def undivided(self) -> Self | None:
+        """Return the same data of which all rows train, where blocks were held out; logs held out whole may test the model."""
+        if self.split.kind != "blocks":
+            return None
+        nothing = tuple(np.zeros_like(motion.valid) for motion in self.motions)
+        return replace(self, split=Split("none", tuple(motion.valid for motion in self.motions), nothing, 0.0))
 
     @property
     def qualities(self) -> Sequence[Mapping[str, Any]]:

@@ -204,8 +204,8 @@ class FitOutcome:
     model, acceptance
         The model, not stored yet, and whether it may replace the base model.
     judged
-        The model from the training rows alone, on which the scores and the verdict are; `model` is from all rows where blocks
-        were held out of the weak form, else the same.
+        The model from the training rows alone, of which scores and verdict are; `model` is from all rows where blocks of the
+        logs were held out, else the same.
     scores
         Scores of `judged`.
     curve

@@ -176,7 +176,7 @@ def _choose_data(data: LogData, training: Sequence[Flags], opened: Sequence[Open
 
 
 def fit_and_judge(data: FitData, components: int, name: str, run: RunContext) -> FitOutcome:
-    """Estimate a correction from the training rows and judge it; where blocks were held out, the model is of all rows then.
+    """Estimate a correction from the training rows and judge it; the model is of all rows then, where blocks were held out.
 
     The verdict is on the estimate that has not seen the held-out rows. Number of components, window length and conditions that
     were chosen without them stay.

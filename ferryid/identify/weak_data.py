@@ -26,7 +26,6 @@ from ferryid.identify.motion_data import LogData
 from ferryid.identify.outcome import Excitation, LogWind
 from ferryid.identify.prediction_windows import PredictionWindows
 from ferryid.identify.settings import FOLDS
-from ferryid.identify.split import Split
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.weak_rows import WeakRows, to_force
 from ferryid.models.forces import ACCELERATIONS, MAPPED, without_sway_coupling
@@ -153,13 +152,6 @@ class WeakData(LogData):
             if name in self.__dict__ and name not in other.__dataclass_fields__:
                 other.__dict__[name] = self.__dict__[name]
         return other
-
-    def undivided(self) -> Self | None:
-        """Return the same data of which all rows train, where blocks were held out; logs held out whole may test the model."""
-        if self.split.kind != "blocks":
-            return None
-        nothing = tuple(np.zeros_like(motion.valid) for motion in self.motions)
-        return replace(self, split=Split("none", tuple(motion.valid for motion in self.motions), nothing, 0.0))
 
     @property
     def winds(self) -> tuple[LogWind, ...]:

@@ -80,8 +80,15 @@ def test_more_rows_leave_less_error_of_the_force_on_another_log(opened: Opened) 
     assert float(np.mean(ratio)) < -0.1
 
 
-@pytest.mark.parametrize("split", ["blocks", "every-kth"])
-def test_the_derivative_stores_what_was_judged(opened: Opened, split: str) -> None:
-    found = fitted(opened, measured(1, noise=20.0), estimator="derivative", split=split, draws=5, components=6)
+def test_the_derivative_is_refitted_too(opened: Opened) -> None:
+    log, settings = measured(1, noise=20.0), {"estimator": "derivative", "draws": 5, "components": 6}
+    found = fitted(opened, log, **settings)
+    whole = fitted(opened, log, measured(2, seconds=60.0), split="logs", **settings)
+    np.testing.assert_allclose(found.model.theta, whole.model.theta, rtol=1e-9, atol=1e-9)
+    assert not np.allclose(found.judged.theta, whole.model.theta, rtol=1e-2)
+
+
+def test_every_kth_row_held_out_stays_out(opened: Opened) -> None:
+    found = fitted(opened, measured(1, noise=20.0), estimator="derivative", split="every-kth", draws=5, components=6)
     assert found.model is found.judged
     assert "refitted" not in found.model.settings
