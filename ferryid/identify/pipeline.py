@@ -228,7 +228,7 @@ def accept_estimate(
     model = judged
     if whole is not None:
         model = _model(told, final, stored, name, scores, acceptance, told.excitation(final))
-        model = replace(model, settings={**model.settings, "refitted": True})
+        model = replace(model, settings={**model.settings, "estimated_from": "all rows"})
     return FitOutcome(
         model=model,
         judged=judged,

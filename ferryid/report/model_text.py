@@ -106,7 +106,7 @@ def describe_settings(model: Model) -> str:
         + (f", weak form over {settings['weak_window_s']:.3g} s" if settings.get("estimator") == "weak" else "")
         + (
             ", judged by the training rows' coefficients and then estimated from all rows"
-            if settings.get("refitted")
+            if settings.get("estimated_from")
             else ""
         )
     )

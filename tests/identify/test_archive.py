@@ -59,13 +59,13 @@ def test_the_same_as_a_fit_to_the_rows(logs: list[str], season: Path, components
     rows = fit_logs(logs, PROFILE, settings, RunContext(season))
     sums = fit_archive(PROFILE, settings, RunContext(season))
     assert sums.curve.chosen == rows.curve.chosen
-    np.testing.assert_allclose(sums.model.theta, rows.model.theta, rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(sums.model.theta, rows.judged.theta, rtol=1e-6, atol=1e-6)
     for key in ("mse", "r2"):
         for who in ("base", "model"):
             name = f"{key}_{who}"
             np.testing.assert_allclose(getattr(sums.scores.force, name), getattr(rows.scores.force, name), rtol=1e-9)
     assert sums.scores.rows == rows.scores.rows
-    assert [one["rows"] for one in sums.model.training] == [one["rows"] for one in rows.model.training]
+    assert [one["rows"] for one in sums.model.training] == [one["rows"] for one in rows.judged.training]
     np.testing.assert_allclose(sums.excitation.heading_coverage, rows.excitation.heading_coverage, atol=0.09)
 
 

@@ -185,7 +185,7 @@ def test_validation_rows_do_not_reach_the_choice(
     np.testing.assert_array_equal(poisoned.logs[0].validation, validation)
     assert len(seen) == 2
     np.testing.assert_array_equal(seen[1].curves.mse, seen[0].curves.mse)
-    np.testing.assert_array_equal(poisoned.model.theta, honest.model.theta)
+    np.testing.assert_array_equal(poisoned.judged.theta, honest.judged.theta)
     assert poisoned.acceptance.normalised_mse != honest.acceptance.normalised_mse
     assert honest.model.settings["window_s"] == seen[0].window_s
     assert honest.model.settings["components"] == seen[0].components

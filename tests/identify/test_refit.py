@@ -50,7 +50,8 @@ def test_held_out_rows_reach_the_model_and_not_what_is_judged(opened: Opened, ou
     other = fitted(opened, altered)
     np.testing.assert_allclose(other.judged.theta, outcome.judged.theta, rtol=1e-6, atol=1e-6)
     assert not np.allclose(other.model.theta, outcome.model.theta, rtol=1e-2)
-    assert (outcome.model.settings.get("refitted"), outcome.judged.settings.get("refitted")) == (True, None)
+    assert outcome.model.settings["estimated_from"] == "all rows"
+    assert "estimated_from" not in outcome.judged.settings
     assert outcome.model.training[0]["rows"] > 1.4 * outcome.judged.training[0]["rows"]
     assert np.isnan(outcome.judged.covariance).all()
     assert outcome.model.scores == outcome.judged.scores == outcome.scores
@@ -91,4 +92,4 @@ def test_the_derivative_is_refitted_too(opened: Opened) -> None:
 def test_every_kth_row_held_out_stays_out(opened: Opened) -> None:
     found = fitted(opened, measured(1, noise=20.0), estimator="derivative", split="every-kth", draws=5, components=6)
     assert found.model is found.judged
-    assert "refitted" not in found.model.settings
+    assert "estimated_from" not in found.model.settings

@@ -128,13 +128,21 @@ def prepare_sha256(log: str, folder: Path) -> str:
     return prepare(log, FERRY, folder, window_s=1.0).recording.sha256
 
 
-def test_what_is_learned_beside_a_named_wind_serves_another_log_as_well_as_a_fit(
-    windy: tuple[str, Model], taught: tuple[Model, Diagnosis], another: str, folder: Path
-) -> None:
-    log, stored = windy[0], taught[0]
-    fitted = fit_logs([log], FERRY, QUICK, RunContext(folder)).model
-    ours, theirs = errors_on(another, folder, stored, fitted)
-    assert ours <= 1.02 * theirs
+def test_what_is_learned_beside_a_named_wind_serves_another_log_as_well_as_a_fit(another: str, folder: Path) -> None:
+    # At twice the speed either is wrong by what one log happens to determine: several logs say which is better.
+    ratios = []
+    for seed in range(11, 17):
+        log = sailed(folder, f"windy {seed}", TWELVE + WINDY, seed, DAMPED)
+        wind = named(sha256 := prepare_sha256(log, folder), north=-3.0, east=2.0)
+        blank = replace(blank_model(FERRY, "ferry"), hull=hull_of_ferry())
+        known = replace(blank, conditions=(Conditions(f"windy {seed}", sha256, (wind,)),))
+        ours, told = learned_on(log, folder, known)
+        assert ours is not None
+        if told.learned is not None and told.learned.accepted:
+            theirs = fit_logs([log], FERRY, QUICK, RunContext(folder)).model
+            ratios.append(errors_on(another, folder, theirs, ours)[1])
+    assert len(ratios) >= 4
+    assert float(np.exp(np.mean(np.log(ratios)))) <= 1.02
 
 
 @pytest.mark.parametrize("steadied", [False, True])
@@ -356,7 +364,7 @@ def test_which_correction_is_stored(
     models = {name: replace(diagnosed, settings={**diagnosed.settings, "test": name}, scores=scores) for name in errors}
 
     def fit(_: Learner) -> SimpleNamespace:
-        return SimpleNamespace(outcome=SimpleNamespace(acceptance=good, model=models["fit"]), validation=rows)
+        return SimpleNamespace(outcome=SimpleNamespace(acceptance=good, judged=models["fit"]), validation=rows)
 
     def remainder(_: Learner, base: Model) -> SimpleNamespace:
         estimators = (EstimatorScore("weak", folds, 0.5, True),)
@@ -364,7 +372,8 @@ def test_which_correction_is_stored(
         own = accept(np.full(3, 100.0), np.full(3, 33.0), "prediction")
         outcome = Outcome(own, estimators, models["first"])
         fitted = SimpleNamespace(outcome=outcome, validation=rows)
-        return SimpleNamespace(model=models["first" if base.hull else "second"], outcome=outcome, fitted=fitted)
+        model = models["first" if base.hull else "second"]
+        return SimpleNamespace(model=model, judged=model, outcome=outcome, fitted=fitted)
 
     def measured(_: Learner, several: Sequence[Model], __: object) -> list[np.ndarray]:
         return [np.full(3, errors[str(one.settings.get("test", "none"))]) for one in several]
