@@ -186,6 +186,8 @@ def as_text(result: FitOutcome, stored: StoredModel, report: Path | None) -> str
         name = f"rms {result.scores.measure} error, {label}"
         lines.append(f"{name:<28}" + "".join(f"{_three_digits(value):>12}" for value in np.sqrt(mse).tolist()))
     lines.append(f"{'R², new':<28}" + "".join(f"{_number(value):>12}" for value in scores.r2_model.tolist()))
+    if model.settings.get("estimated_from"):
+        lines.append("errors are those of a fit to the training rows alone, which judges the model")
     lines.append("")
     for one in result.estimators:
         folds = (

@@ -104,11 +104,7 @@ def describe_settings(model: Model) -> str:
         f"basis {settings.get('basis')}, {settings.get('structure')}, {counted(count, 'component')}, "
         f"window {settings.get('window_s')} s"
         + (f", weak form over {settings['weak_window_s']:.3g} s" if settings.get("estimator") == "weak" else "")
-        + (
-            ", judged by the training rows' coefficients and then estimated from all rows"
-            if settings.get("estimated_from")
-            else ""
-        )
+        + (", coefficients from all rows" if settings.get("estimated_from") else "")
     )
 
 

@@ -227,7 +227,7 @@ def test_fit_takes_the_window_that_it_is_told_to_choose(ferryid, fixtures: Path,
     told = (
         f"{settings['basis']}, decoupled, {count} component{'s' if count > 1 else ''}, window {settings['window_s']} s"
     )
-    assert f"fitted with basis {told}\n" in run.out
+    assert f"fitted with basis {told}, coefficients from all rows\n" in run.out
 
 
 @pytest.mark.draws
