@@ -258,7 +258,16 @@ def aims(study: esso.Study, beside: causes.Winds | None = None) -> list[Aim]:
                 "6 of 9",
                 f"{near.sum()} of {of.sum()}",
                 bool(near.mean() >= NEAR_RUNS),
-                causes.of_directions(winds_of(study, of), NEAR_DEG, NEAR_RUNS, beside),
+                " ".join(
+                    [
+                        causes.of_directions(winds_of(study, of), NEAR_DEG, NEAR_RUNS, beside),
+                        *(
+                            []
+                            if study.shared is None
+                            else [causes.of_the_vessel(study.shared, study.measured, NEAR_DEG)]
+                        ),
+                    ]
+                ),
             )
         )
     wrong = int(np.sum(named & (off > WRONG_DEG)))

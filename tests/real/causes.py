@@ -8,6 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
+from ferryid.diagnose.inference.thresholds import INFERENCE
+from tests.real.shared_force import SharedForce
+
 Floats = NDArray[np.float64]
 
 MEDIAN = float(norm.ppf(0.75))
@@ -73,6 +76,33 @@ def of_directions(winds: Winds, within_deg: float, wanted: float, beside: Winds 
         f"{share * count:.0f} of {count} be expected within {within_deg:.0f} deg: all runs have an error in common, "
         f"{_common(winds)}. {_turns(winds, beside)}"
     )
+
+
+def of_the_vessel(shared: SharedForce, measured: Floats, within_deg: float) -> str:
+    """Return whether a steady force of the vessel is the error of all runs, and what the hull has to do with it.
+
+    `measured` are the winds of the runs, shape (runs, 2).
+    """
+    apart = np.arctan2(*shared.winds.T[::-1]) - np.arctan2(*measured.T[::-1])
+    near = int(np.sum(np.abs((np.degrees(apart) + 180.0) % 360.0 - 180.0) <= within_deg))
+    seen = min(shared.evidence, shared.beside_measured) >= INFERENCE.prior_odds
+    told = (
+        f"A steady sway force and yaw moment of the vessel, the same in all runs, {'explains' if seen else 'does not explain'} "
+        f"it: as large as makes its evidence largest, it gains {shared.evidence:.1f} nat beside the estimated winds and "
+        f"{shared.beside_measured:.1f} beside the measured one, of {INFERENCE.prior_odds:.0f} that an effect needs; with it, "
+        f"{near} of {len(measured)} are within {within_deg:.0f} deg."
+    )
+    damping, true_damping = shared.damping
+    told += (
+        f" The hull is another with the measured wind, gusts included: a sway damping Y_v of {true_damping:.1f} kg/s, against "
+        f"{damping:.1f} kg/s with the estimated steady one."
+    )
+    if damping > true_damping:
+        told += (
+            " Beside a steady wind, what gusts do to the motion is taken for less damping, and a hull that is damped less "
+            "leaves less of a wind on the beam to balance."
+        )
+    return told
 
 
 def of_the_median(winds: Winds) -> str:

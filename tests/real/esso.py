@@ -27,6 +27,7 @@ from ferryid.vessel import load_profile
 from ferryid.vessel.wind import wind_force
 from tests.diagnose.trials import averaged
 from tests.real.places import DATA
+from tests.real.shared_force import SharedForce, shared_force
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -72,7 +73,7 @@ class Judged:
         return next(one for one in self.tests if one.effect == WIND)
 
     def over_time(self, hidden: list[Floats]) -> list[MeasuredCourse]:
-        """Return the course of each run beside the measured wind; none where no wind is confirmed."""
+        """Return the course of each run beside the measured wind; none where no wind is confirmed or estimated."""
         found = []
         for course, member, wind in zip(self.wind.courses, self.wind.fit.campaign.members, hidden, strict=False):
             measurements = member.windows.measurements
@@ -120,10 +121,12 @@ class Study:
     controls
         What it makes of the same runs with conditions that cannot be true, by what they stand on; empty where not asked for.
     over_time
-        The course of the wind in each run beside the measured one; none where no wind is confirmed.
+        The course of the wind in each run beside the measured one; none where no wind is confirmed or estimated.
     gains
         Held-out gain of the wind as it was measured over none, and of its mean, under the noise of the estimate, with the
         profile's coefficients and with the estimate's factors on the load; likewise.
+    shared
+        What a steady force of the vessel explains beside the winds; None where a wind is confirmed, and likewise.
     """
 
     names: tuple[str, ...]
@@ -133,6 +136,7 @@ class Study:
     controls: Mapping[str, Judged]
     over_time: list[MeasuredCourse]
     gains: Mapping[str, Gain]
+    shared: SharedForce | None = None
 
     def of(self, kind: str) -> Flags:
         """Return which runs are of a kind, shape (runs,)."""
@@ -164,6 +168,9 @@ def study(kind: str, *, controlled: bool = True) -> Study:
             for name, winds in ((MEASURED, hidden), (MEAN, steady))
             if controlled
         },
+        shared=shared_force(found.wind.fit, in_wind(campaign, hidden, np.ones(3)))
+        if controlled and not found.wind.confirmed
+        else None,
     )
 
 
@@ -224,9 +231,14 @@ def acting(candidate: Candidate, heading: Callable[[Floats], Floats]) -> Candida
 
 def gain_of(campaign: Campaign, winds: list[Floats], factors: Floats, test: ConditionTest) -> Gain:
     """Return the held-out gain over none of known winds, shape (n, 2) of each run, under the noise of a test's estimate."""
-    members = tuple(blown(member, wind, factors) for member, wind in zip(campaign.members, winds, strict=True))
-    made = estimate_campaign(replace(campaign, members=members), noise=test.fit.noise)
+    made = estimate_campaign(in_wind(campaign, winds, factors), noise=test.fit.noise)
     return Gain.of(held_out_loss(made).gain(test.loss[0]))
+
+
+def in_wind(campaign: Campaign, winds: list[Floats], factors: Floats) -> Campaign:
+    """Return the runs in known winds, shape (n, 2) of each; see `blown`."""
+    members = tuple(blown(member, wind, factors) for member, wind in zip(campaign.members, winds, strict=True))
+    return replace(campaign, members=members)
 
 
 def hidden_wind(log: AveragedLog) -> Floats:

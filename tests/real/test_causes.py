@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from tests.real.causes import Winds, of_directions, of_intervals, of_the_gain, of_the_median, spread_deg
+from tests.real.causes import Winds, of_directions, of_intervals, of_the_gain, of_the_median, of_the_vessel, spread_deg
+from tests.real.shared_force import SharedForce
 
 NORTH = np.tile([1.0, 0.0], (9, 1))
 
@@ -28,6 +31,25 @@ def test_standard_errors_are_told_where_they_explain_it() -> None:
     assert told.endswith("1.50 m/s across the wind in the median, let 4 of 9 be expected within 30 deg.")
     # The size of a normal variable is 0.67 standard deviations in the median, here 45 deg.
     assert "stand for 30 deg in the median" in of_the_median(winds((0.0, 0.0), 1.0))
+
+
+@pytest.mark.parametrize(
+    ("beside", "beside_measured", "explains"),
+    [(2.0, 0.3, "does not explain it"), (12.0, 0.3, "does not explain it"), (12.0, 9.0, "explains it")],
+    ids=["little evidence", "none beside the measured wind", "beside both"],
+)
+def test_a_force_of_the_vessel_is_the_cause_only_where_it_acts_beside_the_measured_wind_too(
+    beside: float, beside_measured: float, explains: str
+) -> None:
+    turned = np.radians(np.repeat([-20.0, 40.0], [4, 5]))
+    shared = SharedForce(beside, np.column_stack([np.cos(turned), np.sin(turned)]), beside_measured, (3.0, -26.0))
+    told = of_the_vessel(shared, NORTH, 30.0)
+    assert f"the same in all runs, {explains}" in told
+    assert "with it, 4 of 9 are within 30 deg" in told
+    assert "Y_v of -26.0 kg/s, against 3.0 kg/s with the estimated steady one" in told
+    assert "taken for less damping" in told
+    # A hull that is damped more beside the estimated winds needs another cause.
+    assert "taken for less damping" not in of_the_vessel(replace(shared, damping=(-30.0, -26.0)), NORTH, 30.0)
 
 
 def test_intervals_are_left_together() -> None:

@@ -150,9 +150,11 @@ class ConditionTest:
 
     @cached_property
     def courses(self) -> tuple[Course, ...]:
-        """Of a flow that is confirmed and changes within logs, its course in each; empty of others."""
+        """Of a flow that is confirmed or estimated and changes within logs, its course in each; empty of others."""
         turbulence = effects()[self.effect].turbulence
-        return estimate_courses(self.fit, self.place, turbulence) if self.confirmed and turbulence is not None else ()
+        if turbulence is None or not (self.confirmed or self.estimated):
+            return ()
+        return estimate_courses(self.fit, self.place, turbulence)
 
     def condition(self, i: int) -> tuple[Floats, Floats]:
         """Return what a log has of it, of a flow with a course its mean, and the covariance, shapes (q,) and (q, q).

@@ -322,6 +322,19 @@ def test_without_a_placebo_nothing_is_confirmed_and_nothing_estimated() -> None:
     assert not bare.estimated
 
 
+def test_a_wind_that_is_estimated_only_has_a_course_and_the_wider_error_of_its_mean() -> None:
+    (wind, *_) = judge_conditions(campaign(), {str(i): i for i in range(3)}, no_progress).tests
+    hint = replace(wind, gain=Gain(1.0, -1.0, 3.0))
+    assert hint.estimated
+    assert not hint.confirmed
+    assert len(hint.courses) == 3
+    steady, course = hint.fit.condition(0, hint.place)[1], hint.courses[0].covariance
+    assert (np.diag(course) > np.diag(steady)).all()
+    assert (np.diag(hint.condition(0)[1]) >= np.diag(course)).all()
+    # What the evidence does not speak for has none.
+    assert replace(hint, evidence=1.0).courses == ()
+
+
 def test_in_calm_logs_nothing_is_confirmed_and_nothing_estimated() -> None:
     judged = judge_conditions(campaign(CALM, conditions=("wind", "current")), {"a": 0, "b": 1, "c": 2}, no_progress)
     assert not any(one.estimated for one in judged.tests)
