@@ -25,6 +25,7 @@ from ferryid.identify.window_length import TRAINING_LENGTHS
 from ferryid.regression.bases.basis import make_basis
 from ferryid.regression.cross_products import CrossProducts
 from ferryid.regression.cross_validation.block_sums import BlockSums
+from ferryid.side_by_side import over
 from ferryid.signals.cache import note_text, recordings
 from ferryid.signals.prepare import open_track
 from ferryid.simulate import load_scenario, simulate, write_log
@@ -81,10 +82,10 @@ def run(quick: bool) -> Section:
     notes = [
         f"Kept of {logs} logs: {size / 1e6:.0f} MB of sums, 36 blocks in three pieces each. Peak memory of the process: "
         f"{peak / 1e9:.2f} GB (goal: at most 1).",
-        f"For the weak form: {windows / 1e6:.0f} MB of windows of {len(TRAINING_LENGTHS)} lengths. A fit holds those of the "
-        f"usual length and of the chosen one, and of some logs the others: {weak_peak / 1e9:.2f} GB. Winds and gusts of each "
-        "log are estimated with the hull by steps over all its windows. Sums cannot replace these: the load of a wind is not "
-        "linear in it.",
+        f"For the weak form: {windows / 1e6:.0f} MB of windows of {len(TRAINING_LENGTHS)} lengths. A fit holds those that "
+        f"validate, of the usual length, those that train, of the chosen one, and of some logs the others: "
+        f"{weak_peak / 1e9:.2f} GB, {weak_peak / 1e6 / logs:.2g} MB a log. Winds and gusts of each log are estimated with the "
+        "hull by steps over all its windows. Sums cannot replace these: the load of a wind is not linear in it.",
         "The pass over the rows forms basis and cross-products in chunks from arrays in memory, once; ingestion and smoothing, "
         "which the sums save as well, are not counted.",
     ]
@@ -132,8 +133,8 @@ def _batch(logs: int, folder: Path) -> list[Row | Timed]:
     ]
 
 
-def season(out: Path, logs: int) -> None:
-    """Write what is kept of `logs` logs of two hours, all made of one simulated trial."""
+def season(out: Path, logs: int, *, weak: bool = True) -> None:
+    """Write what is kept of `logs` logs of two hours, all made of one simulated trial; with `weak`, of the weak form too."""
     problem = out / "trial.mcap"
     write_log(simulate(load_scenario("twelve-corner"), 1), problem)
     open_track(str(problem), PROFILE, out)
@@ -143,15 +144,17 @@ def season(out: Path, logs: int) -> None:
     (path,) = folder.glob("pieces-*.parquet")
     _, told = block_sum_store.read_table(path)
     long = _lengthened(one)
-    usual_s = window_store.load_windows(folder, PROFILE, settings, divided=True).length_s
-    for share in TRAINING_LENGTHS:
-        window_store.load_windows(folder, PROFILE, replace(settings, weak_window_s=share * usual_s), divided=True)
     windows = {}
+    if weak:
+        usual_s = window_store.load_windows(folder, PROFILE, settings, divided=True).length_s
+        for share in TRAINING_LENGTHS:
+            window_store.load_windows(folder, PROFILE, replace(settings, weak_window_s=share * usual_s), divided=True)
     for kept in folder.glob("windows-*.parquet"):
         key = block_sum_store.read_table(kept)[1]["key"]
         of_length = replace(settings, weak_window_s=key["weak_window_s"])
         windows[kept.name] = key, _repeated(window_store.load_windows(folder, PROFILE, of_length, divided=True))
-    for number in range(logs):
+
+    def write(number: int) -> None:
         name, sha256 = f"day{number:04d}", f"{number:08x}".ljust(64, "0")
         place = out / "logs" / f"{name}-{sha256[:8]}-{PROFILE.sha256[:8]}"
         place.mkdir()
@@ -162,6 +165,8 @@ def season(out: Path, logs: int) -> None:
         block_sum_store.write_block_sums(place / path.name, told["key"], replace(long, name=name, sha256=sha256))
         for file, (key, longer) in windows.items():
             window_store.write_windows(place / file, key, replace(longer, name=name, sha256=sha256))
+
+    over(write, range(logs))
     for file in folder.iterdir():
         file.unlink()
     folder.rmdir()

@@ -53,11 +53,14 @@ def run(quick: bool) -> Section:
         rows.append(_row(f"ferryid batch, {logs} logs and nothing to do", _times([resume] * repeats), 5.0))
         fits = [("fit", str(trial), *VESSEL, *SCALE, "--out", str(folder / f"floor{number}")) for number in range(4)]
         simulation = ("simulate", str(scenario), *log)
+        of_fit, bare, simulated, resumed = (row.took_s for row in rows if isinstance(row, Timed))
         floors = [
-            floor("`fit` of 24 min", fits[0], fits[1], (*TABLES, *STATISTICS, "matplotlib.figure")),
-            floor("`fit --no-report`", (*fits[2], "--no-report"), (*fits[3], "--no-report"), (*TABLES, *STATISTICS)),
-            floor("`simulate` of 12 min", simulation, simulation, COMPILED),
-            floor(f"`batch` of {logs} logs and nothing to do", resume, resume, ("numpy", "typer")),
+            floor("`fit` of 24 min", of_fit, fits[0], fits[1], (*TABLES, *STATISTICS, "matplotlib.figure")),
+            floor(
+                "`fit --no-report`", bare, (*fits[2], "--no-report"), (*fits[3], "--no-report"), (*TABLES, *STATISTICS)
+            ),
+            floor("`simulate` of 12 min", simulated, simulation, simulation, COMPILED),
+            floor(f"`batch` of {logs} logs and nothing to do", resumed, resume, resume, ("numpy", "typer")),
         ]
     notes = (
         *floors,

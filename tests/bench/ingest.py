@@ -14,6 +14,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -28,18 +29,13 @@ from ferryid.signals import cache, recording
 from ferryid.signals.recording import log_name, read_recording, record
 from ferryid.vessel import load_profile
 from tests.bench import logs, rivals
-from tests.bench.page import Row, Section, duration, faster, faster_row, in_turn
+from tests.bench.page import Row, Section, duration, faster, faster_row, in_turn, within_row
 from tests.bench.processes import floor
 
 PROFILE = Path(__file__).with_name("bench.toml")
-PLAIN = (
-    ("mcap", "zstd"),
-    ("mcap", "lz4"),
-    ("mcap", "none"),
-    ("bag", "lz4"),
-    ("bag", "none"),
-    ("db3", "none"),
-)
+FORMATS = {"mcap": ("zstd", "lz4", "none"), "bag": ("lz4", "none"), "db3": ("none",)}
+PLAIN = tuple((kind, compression) for kind, compressions in FORMATS.items() for compression in compressions)
+CAMERA = (("mcap", "none"), ("db3", "none"), ("mcap", "zstd"), ("mcap", "lz4"))
 NAMES = {"mcap": "MCAP", "bag": "ROS1", "db3": "db3"}
 ROSBAGS = "rosbags → pandas → Parquet"
 
@@ -130,29 +126,28 @@ def parquet_of(log: Path) -> Callable[[], None]:
 def against_rosbags(folder: Path, short: float, long: float) -> list[Row]:
     """Log → Parquet, without the content hash, which the rival does not make, and with it.
 
-    The rival is timed on the short log of the same format in the same rounds, as a machine changes its speed within a run:
-    nearly all that it takes is deserialising, whatever the compression, and grows with the number of messages.
+    The rival is timed on the short log of the same format in the same rounds, as a machine changes its speed within a run, once
+    a round: nearly all that it takes is deserialising, whatever the compression, and grows with the number of messages.
     """
-    rivals_logs = {
-        kind: logs.log(folder, kind, compression, short) for kind, compression in dict(reversed(PLAIN)).items()
-    }
-    rows = []
-    for minutes in dict.fromkeys((short, long)):
-        for kind, compression in PLAIN:
+    lengths = tuple(dict.fromkeys((short, long)))
+    rows: dict[tuple[float, str, str], list[Row]] = {}
+    for kind, compressions in FORMATS.items():
+        measured = [(minutes, compression) for minutes in lengths for compression in compressions]
+        works: list[Callable[[], object]] = [partial(by_rosbags, logs.log(folder, kind, compressions[-1], short))]
+        for minutes, compression in measured:
             log = logs.log(folder, kind, compression, minutes)
+            columns(log)
+            works += [partial(columns_to_parquet, log), partial(ingest, log)]
+        of_short, *ours = in_turn(works, 3)
+        for (minutes, compression), bare, whole in zip(measured, ours[::2], ours[1::2], strict=True):
             goal = None if minutes < 120 else 15.0 if kind == "db3" else 35.0
             what = f"{minutes:g} min {NAMES[kind]} {compression}: log → Parquet"
-            columns(log)
-            works = [
-                lambda log=log: columns_to_parquet(log),
-                lambda log=log: ingest(log),
-                lambda log=rivals_logs[kind]: by_rosbags(log),
-            ]
-            bare, whole, of_short = in_turn(works, 3)
             theirs = [took * minutes / short for took in of_short]
-            rows.append(faster_row(what, bare, ROSBAGS, theirs, goal))
-            rows.append(faster_row(f"{what}, with content hash", whole, ROSBAGS, theirs, None))
-    return rows
+            rows[minutes, kind, compression] = [
+                faster_row(what, bare, ROSBAGS, theirs, goal),
+                faster_row(f"{what}, with content hash", whole, ROSBAGS, theirs, None),
+            ]
+    return [row for minutes in lengths for kind, compression in PLAIN for row in rows[minutes, kind, compression]]
 
 
 def against_least_work(folder: Path, minutes: float) -> tuple[list[Row], list[str], float]:
@@ -170,25 +165,16 @@ def against_least_work(folder: Path, minutes: float) -> tuple[list[Row], list[st
         ours, unpacked, written = in_turn(
             (lambda log=log: columns_to_parquet(log), decompress(log), parquet_of(log)), 5
         )
-        ratio = statistics.median(a / (b + c) for a, b, c in zip(ours, unpacked, written, strict=True))
-        middle, unpacked_s, written_s = map(statistics.median, (ours, unpacked, written))
+        unpacked_s, written_s = map(statistics.median, (unpacked, written))
         if (kind, compression) == PLAIN[0]:
             zstd_s = unpacked_s
+        least = [a + b for a, b in zip(unpacked, written, strict=True)]
         goal = 1.5 if compression == "zstd" else 2.0
-        rows.append(
-            Row(
-                f"{name}: read + write",
-                duration(middle),
-                "decompress all + write the same Parquet",
-                duration(unpacked_s + written_s),
-                ratio,
-                f"≤ {goal:g}",
-                ratio <= goal,
-            )
-        )
+        row = within_row(f"{name}: read + write", ours, "decompress all + write the same Parquet", least, goal)
+        rows.append(row)
         notes.append(
             f"{name}: decompressing takes {duration(unpacked_s)} and writing {duration(written_s)}; of the "
-            f"{duration(middle)} of both and what is between, {between(log)}."
+            f"{row.ours} of both and what is between, {between(log)}."
         )
     return rows, notes, zstd_s
 
@@ -238,7 +224,7 @@ def between(log: Path) -> str:
 def against_whole_camera_log(folder: Path, minutes: float) -> list[Row]:
     """A log that is nearly all pictures: reading the signals, against reading or decompressing everything."""
     rows = []
-    for kind, compression in (("mcap", "none"), ("db3", "none"), ("mcap", "zstd"), ("mcap", "lz4")):
+    for kind, compression in CAMERA:
         log = logs.log(folder, kind, compression, minutes, camera=True)
         what = f"{minutes:g} min {NAMES[kind]} {compression} with camera: read"
         columns(log)
@@ -299,35 +285,30 @@ def rival_process(log: Path, before: str = "", code: str = THEIRS) -> str:
         return script(before + code, log, out)
 
 
-def as_process(folder: Path, minutes: float, repeats: int) -> list[Row]:
-    """One whole process, start-up included; where they are installed, against the fastest readers in Python as well."""
-    rows = [
-        faster(
-            f"{minutes:g} min {NAMES[kind]} {compression}: whole process",
-            lambda log=log: process(log),
-            "rosbags and pandas in a process",
-            lambda log=log: rival_process(log),
-            8.0,
-            repeats,
-        )
-        for kind, compression in (("mcap", "zstd"), ("bag", "lz4"), ("db3", "none"))
-        for log in (logs.log(folder, kind, compression, minutes),)
-    ]
-    if not all(importlib.util.find_spec(name) for name in ("small_mcap", "mcap_ros2_support_fast")):
-        return rows
-    log = logs.log(folder, "mcap", "zstd", minutes)
-    for told, code in (("the mapped topics", SMALL_MCAP), ("all topics", SMALL_MCAP_ALL)):
-        rows.append(
-            faster(
-                f"{minutes:g} min MCAP zstd: whole process",
-                lambda: process(log),
-                f"small-mcap with mcap-ros2-support-fast and pandas, {told}",
-                lambda code=code: rival_process(log, code=code),
-                1.0,
-                repeats,
-            )
-        )
-    return rows
+def as_process(folder: Path, minutes: float, repeats: int) -> tuple[list[Row], float]:
+    """One whole process, start-up included; where they are installed, against the fastest readers in Python as well.
+
+    Returns
+    -------
+    tuple
+        The rows, and what a log in MCAP takes [s].
+    """
+    rows, mcap_s = [], math.nan
+    more = all(importlib.util.find_spec(name) for name in ("small_mcap", "mcap_ros2_support_fast"))
+    for kind, compression in (("mcap", "zstd"), ("bag", "lz4"), ("db3", "none")):
+        log = logs.log(folder, kind, compression, minutes)
+        others = [("rosbags and pandas in a process", THEIRS, 8.0)]
+        if more and kind == "mcap":
+            name = "small-mcap with mcap-ros2-support-fast and pandas"
+            others += [(f"{name}, the mapped topics", SMALL_MCAP, 1.0), (f"{name}, all topics", SMALL_MCAP_ALL, 1.0)]
+        works: list[Callable[[], object]] = [partial(process, log)]
+        works += [partial(rival_process, log, code=code) for _, code, _ in others]
+        ours, *theirs = in_turn(works, repeats)
+        if kind == "mcap":
+            mcap_s = statistics.median(ours)
+        what = f"{minutes:g} min {NAMES[kind]} {compression}: whole process"
+        rows += [faster_row(what, ours, name, took, goal) for (name, _, goal), took in zip(others, theirs, strict=True)]
+    return rows, mcap_s
 
 
 def peak_mb(said: str) -> float:
@@ -360,19 +341,29 @@ def run(quick: bool, folder: Path | None = None) -> Section:
     """
     folder = folder or Path(tempfile.gettempdir()) / "ferryid-bench-logs"
     short, long, camera = (1.0, 1.0, 0.2) if quick else (12.0, 120.0, 3.0)
+    logs.make(
+        folder,
+        [
+            *((*one, minutes, False) for minutes in (short, long) for one in PLAIN),
+            *((*one, camera, True) for one in CAMERA),
+        ],
+    )
     rows = against_rosbags(folder, short, long)
     least, between_notes, zstd_s = against_least_work(folder, long)
     rows += least
     rows += against_whole_camera_log(folder, camera)
     rows += against_rerun(folder, short)
-    rows += as_process(folder, short, 1 if quick else 3)
+    processes, process_s = as_process(folder, short, 1 if quick else 3)
+    rows += processes
     rows += memory(folder, long)
     with scratch() as first, scratch() as second:
         words = [
             ("ingest", str(logs.log(folder, "mcap", "zstd", short)), "--vessel", str(PROFILE), "--out", str(out))
             for out in (first, second)
         ]
-        process_note = floor(f"`ingest` of {short:g} min", *words, ("numpy", "pyarrow", "pyarrow.parquet", "typer"))
+        process_note = floor(
+            f"`ingest` of {short:g} min", process_s, *words, ("numpy", "pyarrow", "pyarrow.parquet", "typer")
+        )
     return Section(
         "Ingestion",
         rows,

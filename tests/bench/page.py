@@ -156,13 +156,10 @@ def faster(
     return faster_row(what, mine, name, theirs, goal)
 
 
-def within(
-    what: str, ours: Callable[[], object], name: str, limit: Callable[[], object], goal: float, repeats: int
-) -> Row:
-    """Measure how many times as long ours takes as the least work conceivable."""
-    mine, least = in_turn((ours, limit), repeats)
-    ratio = statistics.median(a / b for a, b in zip(mine, least, strict=True))
-    values = duration(statistics.median(mine)), name, duration(statistics.median(least)), ratio
+def within_row(what: str, ours: Sequence[float], name: str, limit: Sequence[float], goal: float) -> Row:
+    """Row of how many times as long ours takes as the least work conceivable, of times of the same rounds [s]."""
+    ratio = statistics.median(a / b for a, b in zip(ours, limit, strict=True))
+    values = duration(statistics.median(ours)), name, duration(statistics.median(limit)), ratio
     return Row(what, *values, f"≤ {goal:g}", ratio <= goal)
 
 

@@ -48,19 +48,20 @@ print("took", *took)
 """Runs commands in one process: the second has everything loaded and compiled."""
 
 
-def floor(what: str, first: Sequence[str], again: Sequence[str], packages: Sequence[str]) -> str:
+def floor(what: str, whole_s: float, first: Sequence[str], again: Sequence[str], packages: Sequence[str]) -> str:
     """Return what of a command's time nothing of ferryid can save, and what is the work itself, as a sentence.
 
     Parameters
     ----------
     what
         The command.
+    whole_s
+        What it takes as a process of its own [s].
     first, again
         Its words, and those of a second one that does the same work in the same process.
     packages
         What any program for this would import.
     """
-    whole_s = min(whole_process(words)[0] for words in (first, again))
     bare = [sys.executable, "-c", f"import {', '.join(packages)}"]
     alone = []
     for _ in range(3):
