@@ -20,8 +20,8 @@ TABLES = ("numpy", "pyarrow", "pyarrow.parquet", "typer")
 """Packages that any program needs which has a command line and writes Parquet."""
 STATISTICS = ("scipy.linalg", "scipy.special")
 """What a fit needs besides: banded equations, and quantiles of its intervals."""
-COMPILED = ("numpy", "numba", "scipy.linalg.cython_blas", "typer")
-"""What a simulation needs: numba loads the third with the first compiled function, whatever that calls."""
+COMPILED = ("numpy", "numba", "typer")
+"""What a simulation needs."""
 ROUND = """
 schema = "ferryid.scenario/1"
 title = "One round of the 12-corner path"
