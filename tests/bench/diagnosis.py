@@ -22,7 +22,7 @@ LENGTHS_S = {720: 5.0, 1440: 8.0, 3600: 45.0, 7200: 90.0}
 """Lengths of a single log [s], and the goal of each [s]; six hours are measured with gaps, in `tests.bench.long`."""
 REPEATED_S, REPEATS = 720, 3
 """Logs up to this length [s] are diagnosed so many times, and the median counts."""
-LOGS = {2: None, 7: None, 14: 20.0}
+LOGS = {2: None, 5: None, 14: 20.0}
 """Logs of seven minutes in a campaign, and the goal of as many [s]."""
 LINEAR = 1.1
 """Most power of the length, and of the number of logs, with which the time may grow."""

@@ -156,11 +156,11 @@ def faster(
     return faster_row(what, mine, name, theirs, goal)
 
 
-def within_row(what: str, ours: Sequence[float], name: str, limit: Sequence[float], goal: float) -> Row:
+def within_row(what: str, ours: Sequence[float], name: str, limit: Sequence[float], goal: float | None) -> Row:
     """Row of how many times as long ours takes as the least work conceivable, of times of the same rounds [s]."""
     ratio = statistics.median(a / b for a, b in zip(ours, limit, strict=True))
     values = duration(statistics.median(ours)), name, duration(statistics.median(limit)), ratio
-    return Row(what, *values, f"≤ {goal:g}", ratio <= goal)
+    return Row(what, *values) if goal is None else Row(what, *values, f"≤ {goal:g}", ratio <= goal)
 
 
 def duration(value_s: float) -> str:

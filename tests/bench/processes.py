@@ -11,13 +11,25 @@ import time
 from collections.abc import Mapping, Sequence
 
 
-def whole_process(arguments: Sequence[str], environment: Mapping[str, str] | None = None) -> tuple[float, int]:
-    """Return time [s] and peak memory [bytes] of one command in a process of its own, with more in its environment."""
+def whole_process(
+    arguments: Sequence[str], environment: Mapping[str, str] | None = None, before: str = ""
+) -> tuple[float, int]:
+    """Return time [s] and peak memory [bytes] of one command in a process of its own.
+
+    Parameters
+    ----------
+    arguments
+        Words of the command.
+    environment
+        What else is in its environment.
+    before
+        Python that it runs before.
+    """
     # What the kernel tells of a child counts in the memory of the process that forked it: the child tells by itself.
     program = (
         "import atexit, sys; from ferryid.cli.main import main; "
         "atexit.register(lambda: print(open('/proc/self/status').read().partition('VmHWM:')[2].split()[0], file=sys.stderr)); "
-        "main()"
+        f"{before}; main()"
     )
     start = time.perf_counter()
     run = subprocess.run(
