@@ -13,7 +13,7 @@ from ferryid.batch.kept import key_of, read_row, write_row
 from ferryid.batch.log_result import LogFile
 from ferryid.simulate import load_scenario, simulate, write_log
 from tests.bench.page import Row, Section, Timed, faster_row
-from tests.bench.processes import floor, whole_process
+from tests.bench.processes import floor, where, whole_process
 from tests.bench.trials import SCALE, VESSEL
 
 TABLES = ("numpy", "pyarrow", "pyarrow.parquet", "typer")
@@ -22,6 +22,13 @@ STATISTICS = ("scipy.linalg", "scipy.special")
 """What a fit needs besides: banded equations, and quantiles of its intervals."""
 COMPILED = ("numpy", "numba", "typer")
 """What a simulation needs."""
+STAGES = {
+    "reading": ":read_logs",
+    "forces that act the wrong way": ":refuse_reversed_forces",
+    "length of the windows": ":best_length",
+    "wind and gusts of each log": "/identify/weak_data.py:conditions",
+    "runs of the model without the measured motion": ":free_runs",
+}
 ROUND = """
 schema = "ferryid.scenario/1"
 title = "One round of the 12-corner path"
@@ -51,7 +58,7 @@ def run(quick: bool) -> Section:
         ]
         resume = _resumable(folder / "batch", logs)
         rows.append(_row(f"ferryid batch, {logs} logs and nothing to do", _times([resume] * repeats), 5.0))
-        fits = [("fit", str(trial), *VESSEL, *SCALE, "--out", str(folder / f"floor{number}")) for number in range(4)]
+        fits = [("fit", str(trial), *VESSEL, *SCALE, "--out", str(folder / f"floor{number}")) for number in range(6)]
         simulation = ("simulate", str(scenario), *log)
         of_fit, bare, simulated, resumed = (row.took_s for row in rows if isinstance(row, Timed))
         floors = [
@@ -59,6 +66,7 @@ def run(quick: bool) -> Section:
             floor(
                 "`fit --no-report`", bare, (*fits[2], "--no-report"), (*fits[3], "--no-report"), (*TABLES, *STATISTICS)
             ),
+            *where(STAGES, (*fits[4], "--no-report"), {"`fit --no-report`": (*fits[5], "--no-report")}),
             floor("`simulate` of 12 min", simulated, simulation, simulation, COMPILED),
             floor(f"`batch` of {logs} logs and nothing to do", resumed, resume, resume, ("numpy", "typer")),
         ]
