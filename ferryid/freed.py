@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import ctypes
-import gc
 from contextlib import suppress
 
 
 def give_back() -> None:
     """Give freed memory back where the C library can: glibc keeps it in the arenas of threads, where others do not find it."""
-    gc.collect()
     with suppress(AttributeError, OSError, TypeError):
         ctypes.CDLL(None).malloc_trim(0)

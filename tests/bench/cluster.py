@@ -98,7 +98,7 @@ def run(quick: bool) -> Section:
                     found.proof[count] = whole_process(words)[0]
                 if count == 1:
                     # The first log of each kind goes with the time of the process itself, and does not count.
-                    few = 1 + logs // 3
+                    few = max(logs // 2, 2)
                     some = [batch(paths[:number], f"some{number}", address) for number in (1, few)]
                     short_log_s = (some[1] - some[0]) / (few - 1)
                     longer = [written(folder, 200 + number, long_s) for number in range(2)]

@@ -247,7 +247,11 @@ def page(sections: Sequence[Section], quick: bool, pictures: Sequence[tuple[str,
         lines += ["", *(f"- {note}" for note in section.notes), ""]
     parts = ", ".join(f"{section.title} {section.took_s:.0f} s" for section in sections)
     whole_s = sum(section.took_s for section in sections)
-    lines += ["## How long this page takes", "", f"{whole_s / 60:.1f} minutes: {parts}."]
+    lines += [
+        "## How long this page takes",
+        "",
+        f"{whole_s / 60:.1f} minutes, the yardstick and making logs among them: {parts}.",
+    ]
     return "\n".join(lines).rstrip() + "\n"
 
 
