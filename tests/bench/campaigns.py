@@ -43,7 +43,7 @@ def run(quick: bool) -> Section:
     notes = [
         f"`diagnose LOG...` of all together, whole processes, from the recorded logs to the report; {LARGEST_GB:g} GB of "
         "memory are allowed in every row. Every log has a wind of its own and noise of its own.",
-        "The fits by which a model is learnt are made one after another here, as with a hundred logs, and not side by side.",
+        "The fits of the model to all rows are made one after another here, as with a hundred logs, and not side by side.",
     ]
     return Section("Campaigns", rows, notes)
 
