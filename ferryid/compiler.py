@@ -31,7 +31,6 @@ except ImportError:  # Windows: every process compiles
     fcntl = None  # type: ignore[assignment]
 
 
-
 def _without_blas() -> None:
     """Load numba's functions of arrays without the matrix products that hardly any loop here calls.
 
