@@ -23,12 +23,29 @@ import numba
 import numpy as np
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.ccallback import CFunc
+from numba.np import linalg
 
 try:
     import fcntl
 except ImportError:  # Windows: every process compiles
     fcntl = None  # type: ignore[assignment]
 
+
+def _without_blas() -> None:
+    """Load numba's functions of arrays without the matrix products that hardly any loop here calls.
+
+    numba looks whether SciPy has them as it loads the first compiled function, which takes longer than a short simulation; it
+    looks again where a function calls one.
+    """
+    looks = linalg.ensure_blas
+    linalg.ensure_blas = lambda: None
+    try:
+        from numba.np import arraymath  # noqa: F401
+    finally:
+        linalg.ensure_blas = looks
+
+
+_without_blas()
 LONGEST_WAIT_S = 120.0
 """How long a process waits for another one that compiles the same function before it does so itself."""
 

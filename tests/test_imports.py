@@ -12,19 +12,20 @@ import pytest
 HEAVY = (
     "aiohttp", "apsw", "distributed", "google.protobuf", "jinja2", "llvmlite", "matplotlib", "mcap", "numba", "pandas",
     "pyarrow", "pyarrow.dataset", "pydantic", "rich", "rosbags", "rosbags.highlevel", "rosbags.rosbag2", "ruamel",
-    "scipy", "scipy.cluster", "scipy.optimize", "scipy.signal", "scipy.spatial", "scipy.special", "scipy.stats", "sqlite3",
+    "scipy", "scipy.cluster", "scipy.linalg", "scipy.optimize", "scipy.signal", "scipy.spatial", "scipy.special", "scipy.stats",
+    "sqlite3",
 )  # fmt: skip
 """What takes more than some hundredths of a second to load."""
 READS = {"mcap", "rosbags"}
 KEEPS = {"pyarrow"}
 LOOPS = {"llvmlite", "numba", "scipy"}
-"""numba loads what it has compiled, and looks for scipy."""
-ESTIMATES = {"scipy", "scipy.special", "scipy.optimize", "scipy.spatial"}
+"""numba looks for scipy, and needs its linear algebra only where a loop does."""
+ESTIMATES = {"scipy", "scipy.linalg", "scipy.special", "scipy.optimize", "scipy.spatial"}
 PAGES = {"matplotlib", "jinja2"}
 LOG = "fixtures/short.mcap"
 VESSEL = ("--vessel", "milliampere")
 COMMANDS: dict[str, tuple[tuple[str, ...], set[str]]] = {
-    "inspect": (("inspect", LOG), READS | {"scipy", "scipy.special"}),
+    "inspect": (("inspect", LOG), READS | {"scipy", "scipy.linalg", "scipy.special"}),
     "ingest": (("ingest", LOG, *VESSEL), READS | KEEPS),
     "ingest again": (("ingest", LOG, *VESSEL), KEEPS),
     "fit": (("fit", LOG, *VESSEL, "--accept", "thesis", "--no-report"), ESTIMATES | KEEPS),

@@ -21,6 +21,7 @@ ORDER = (
     "files",
     "interrupts",
     "side_by_side",
+    "freed",
     "compiler",
     "compiled",
     "lazy",

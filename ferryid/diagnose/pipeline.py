@@ -31,6 +31,7 @@ from ferryid.diagnose.judging.model_update import store_updated_model
 from ferryid.diagnose.second_sources import compare_second_sources
 from ferryid.effects.wording import listed
 from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.freed import give_back
 from ferryid.models import Model
 from ferryid.models.store import check_name
 from ferryid.side_by_side import over
@@ -282,6 +283,8 @@ def diagnose_and_store(
     found = diagnose(logs, profile, settings, run)
     if diagnosed is not None:
         diagnosed(found)
+    # The rows of all logs are read anew to learn from them.
+    give_back()
     learner = None
     # Of a simulation no model comes.
     if settings.against is None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -27,6 +28,7 @@ from ferryid.side_by_side import over
 from ferryid.types import RunContext
 from ferryid.vessel.profile import Profile
 
+T = TypeVar("T")
 _AT_A_TIME = 16
 """Logs that are read before progress is told again."""
 
@@ -41,15 +43,11 @@ def fit_weak_archive(
             "on them. Fix: give --window 1, or --estimator derivative"
         )
     where = archived_folders(run.tables or run.out, profile, names)
-    usual = replace(settings, weak_window_s=None)
-    logs, functions = archived_windows(where, profile, usual, run.progress, divided=settings.split == "blocks")
-    check_components(settings.components, functions)
-    trained, validated = _divided(logs, settings.split)
-    data = WindowedData.of(profile, settings, functions, logs, trained, validated)
+    data = _usual(profile, settings, where, run)
     judged = sum(len(one) for one in data.windows.validation)
     if judged < IDENTIFY.fewest_judged:
         raise FerryIdError(
-            f"{data.where}: too little for validation in the weak form, found {counted(len(logs), 'log')} with "
+            f"{data.where}: too little for validation in the weak form, found {counted(len(data.logs), 'log')} with "
             f"{counted(judged, 'validation window')} of {data.windows.length_s:.3g} s. "
             "Fix: ingest more or longer logs, or give --estimator derivative"
         )
@@ -62,6 +60,17 @@ def fit_weak_archive(
     data.refuse_contradictions()
     estimate = estimate_correction(data, data.components(), settings.draws, run.progress)
     return accept_estimate(data, estimate, name, run)
+
+
+def _usual(profile: Profile, settings: FitSettings, where: Sequence[Path], run: RunContext) -> WindowedData:
+    """Return the data with windows of the usual length."""
+    usual = replace(settings, weak_window_s=None)
+    logs, functions = archived_windows(where, profile, usual, run.progress, divided=settings.split == "blocks")
+    check_components(settings.components, functions)
+    trained, validated = _divided(logs, settings.split)
+    # The data hold the parts themselves: those that another length replaces are let go.
+    bare = [replace(log, parts=()) for log in logs]
+    return WindowedData.of(profile, settings, functions, bare, trained, validated)
 
 
 def _with_best_length(data: WindowedData, where: Sequence[Path], run: RunContext) -> WindowedData:
@@ -81,10 +90,13 @@ def _of_length(data: WindowedData, where: Sequence[Path], length_s: float, run: 
     """Return the data with training windows of another length [s]."""
     settings = replace(data.settings, weak_window_s=length_s)
     divided = data.settings.split == "blocks"
-    logs, _ = archived_windows(where, data.profile, settings, run.progress, divided=divided)
     trained = [
         one if one.rows and before.rows else one.none()
-        for one, before in zip((log.parts[0] for log in logs), data.trained, strict=True)
+        for one, before in zip(
+            _read(where, data.profile, settings, run.progress, divided, lambda log: log.parts[0]),
+            data.trained,
+            strict=True,
+        )
     ]
     return replace(data, trained=tuple(trained), training_s=length_s)
 
@@ -104,14 +116,30 @@ def archived_windows(
     FerryIdError
         For a log of another basis, by name.
     """
-    logs: list[LogWindows] = []
+    logs = _read(where, profile, settings, progress, divided, lambda log: log)
+    return tuple(logs), make_basis(logs[0].basis, structure=settings.structure)
+
+
+def _read(
+    where: Sequence[Path],
+    profile: Profile,
+    settings: FitSettings,
+    progress: Callable[[str], None],
+    divided: bool,
+    keep: Callable[[LogWindows], T],
+) -> list[T]:
+    """Return what is kept of the windows of every log."""
+    first: LogWindows | None = None
+    kept: list[T] = []
     for low in range(0, len(where), _AT_A_TIME):
         progress(f"adding log {low + 1} of {len(where)}")
         some = where[low : low + _AT_A_TIME]
-        logs += over(lambda folder: load_windows(folder, profile, settings, divided=divided), some)
-        for log in logs[low:]:
-            refuse_other_basis((logs[0].name, logs[0].basis), (log.name, log.basis))
-    return tuple(logs), make_basis(logs[0].basis, structure=settings.structure)
+        logs = over(lambda folder: load_windows(folder, profile, settings, divided=divided), some)
+        first = first or logs[0]
+        for log in logs:
+            refuse_other_basis((first.name, first.basis), (log.name, log.basis))
+        kept += [keep(log) for log in logs]
+    return kept
 
 
 def _divided(logs: Sequence[LogWindows], split: str) -> tuple[list[WindowPart], list[WindowPart]]:

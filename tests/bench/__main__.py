@@ -46,12 +46,12 @@ def main() -> int:
             run = importlib.import_module(f"tests.bench.{name}").run
             if name == "ingest":
                 run = partial(run, folder=options.folder)
+            start = time.perf_counter()
             # A quick run has time for one measurement of the yardstick.
             before = [] if options.quick and sections else [yardstick.measured(options.folder)]
-            start = time.perf_counter()
             section = run(options.quick)
-            took_s = time.perf_counter() - start
             after = [yardstick.measured(options.folder)] if whole and name == MODULES[-1] else []
+            took_s = time.perf_counter() - start
             sections.append(replace(section, yardstick_s=(*before, *after), took_s=took_s))
             if whole:
                 lines.add(name, packed(sections[-1]))

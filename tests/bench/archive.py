@@ -25,6 +25,7 @@ from ferryid.identify.window_length import TRAINING_LENGTHS
 from ferryid.regression.bases.basis import make_basis
 from ferryid.regression.cross_products import CrossProducts
 from ferryid.regression.cross_validation.block_sums import BlockSums
+from ferryid.side_by_side import over
 from ferryid.signals.cache import note_text, recordings
 from ferryid.signals.prepare import open_track
 from ferryid.simulate import load_scenario, simulate, write_log
@@ -39,6 +40,9 @@ ROWS_A_LOG = 144_000
 """Two hours at 20 Hz."""
 HELP_GOAL_S = 0.08
 BATCH_LOGS, BATCH_GOAL_S = 20, 180.0
+"""Logs of a batch and the goal of all [s]."""
+MEASURED_LOGS = 10
+"""So many of them are measured, against their part of the goal: a smaller batch has the same start."""
 RIVAL_LOGS = 4
 """Logs of the batch that the rival reads; its time is multiplied."""
 PROFILE = load_profile("milliampere")
@@ -81,16 +85,16 @@ def run(quick: bool) -> Section:
     notes = [
         f"Kept of {logs} logs: {size / 1e6:.0f} MB of sums, 36 blocks in three pieces each. Peak memory of the process: "
         f"{peak / 1e9:.2f} GB (goal: at most 1).",
-        f"For the weak form: {windows / 1e6:.0f} MB of windows of {len(TRAINING_LENGTHS)} lengths. A fit holds those of the "
-        f"usual length and of the chosen one, and of some logs the others: {weak_peak / 1e9:.2f} GB. Winds and gusts of each "
-        "log are estimated with the hull by steps over all its windows. Sums cannot replace these: the load of a wind is not "
-        "linear in it.",
+        f"For the weak form: {windows / 1e6:.0f} MB of windows of {len(TRAINING_LENGTHS)} lengths. A fit holds those that "
+        f"validate, of the usual length, those that train, of the chosen one, and of some logs the others: "
+        f"{weak_peak / 1e9:.2f} GB, {weak_peak / 1e6 / logs:.2g} MB a log. Winds and gusts of each log are estimated with the "
+        "hull by steps over all its windows. Sums cannot replace these: the load of a wind is not linear in it.",
         "The pass over the rows forms basis and cross-products in chunks from arrays in memory, once; ingestion and smoothing, "
         "which the sums save as well, are not counted.",
     ]
     start_up, same = _start_up(3 if quick else 15)
     with tempfile.TemporaryDirectory() as folder:
-        rows = [*table, *_batch(1 if quick else BATCH_LOGS, Path(folder)), *start_up]
+        rows = [*table, *_batch(1 if quick else MEASURED_LOGS, Path(folder)), *start_up]
     return Section(
         "Archive and start-up",
         rows,
@@ -132,8 +136,8 @@ def _batch(logs: int, folder: Path) -> list[Row | Timed]:
     ]
 
 
-def season(out: Path, logs: int) -> None:
-    """Write what is kept of `logs` logs of two hours, all made of one simulated trial."""
+def season(out: Path, logs: int, *, weak: bool = True) -> None:
+    """Write what is kept of `logs` logs of two hours, all made of one simulated trial; with `weak`, of the weak form too."""
     problem = out / "trial.mcap"
     write_log(simulate(load_scenario("twelve-corner"), 1), problem)
     open_track(str(problem), PROFILE, out)
@@ -143,15 +147,17 @@ def season(out: Path, logs: int) -> None:
     (path,) = folder.glob("pieces-*.parquet")
     _, told = block_sum_store.read_table(path)
     long = _lengthened(one)
-    usual_s = window_store.load_windows(folder, PROFILE, settings, divided=True).length_s
-    for share in TRAINING_LENGTHS:
-        window_store.load_windows(folder, PROFILE, replace(settings, weak_window_s=share * usual_s), divided=True)
     windows = {}
+    if weak:
+        usual_s = window_store.load_windows(folder, PROFILE, settings, divided=True).length_s
+        for share in TRAINING_LENGTHS:
+            window_store.load_windows(folder, PROFILE, replace(settings, weak_window_s=share * usual_s), divided=True)
     for kept in folder.glob("windows-*.parquet"):
         key = block_sum_store.read_table(kept)[1]["key"]
         of_length = replace(settings, weak_window_s=key["weak_window_s"])
         windows[kept.name] = key, _repeated(window_store.load_windows(folder, PROFILE, of_length, divided=True))
-    for number in range(logs):
+
+    def write(number: int) -> None:
         name, sha256 = f"day{number:04d}", f"{number:08x}".ljust(64, "0")
         place = out / "logs" / f"{name}-{sha256[:8]}-{PROFILE.sha256[:8]}"
         place.mkdir()
@@ -162,6 +168,8 @@ def season(out: Path, logs: int) -> None:
         block_sum_store.write_block_sums(place / path.name, told["key"], replace(long, name=name, sha256=sha256))
         for file, (key, longer) in windows.items():
             window_store.write_windows(place / file, key, replace(longer, name=name, sha256=sha256))
+
+    over(write, range(logs))
     for file in folder.iterdir():
         file.unlink()
     folder.rmdir()

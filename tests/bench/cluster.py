@@ -32,8 +32,8 @@ QUICK_S = 180
 """Length of the shorter logs of a quick run [s]."""
 LONG_S = 3600
 """Length of the longer logs [s], by which the time of a log is split into what its rows take and what it takes without."""
-CASES = ("--only", "short", "--runs", "1", "--seed", "20261128")
-TRIVIAL = 1000
+CASES = ("--only", "short", "--runs", "0.5", "--seed", "20261128")
+TRIVIAL = 500
 PROJECTED_LOGS, PROJECTED_ROWS = 10_000, 10_000_000_000
 RATE_HZ = 20.0
 RECIPE = 'steps = ["fit"]\n[fit]\ndelta = 0.4\nsigma = 0.4\n'
@@ -98,8 +98,9 @@ def run(quick: bool) -> Section:
                     found.proof[count] = whole_process(words)[0]
                 if count == 1:
                     # The first log of each kind goes with the time of the process itself, and does not count.
-                    some = [batch(paths[:number], f"some{number}", address) for number in (1, logs)]
-                    short_log_s = (some[1] - some[0]) / (logs - 1)
+                    few = max(logs // 2, 2)
+                    some = [batch(paths[:number], f"some{number}", address) for number in (1, few)]
+                    short_log_s = (some[1] - some[0]) / (few - 1)
                     longer = [written(folder, 200 + number, long_s) for number in range(2)]
                     some = [batch(longer[:number], f"long{number}", address) for number in (1, 2)]
                     long_log_s = some[1] - some[0]
@@ -107,7 +108,7 @@ def run(quick: bool) -> Section:
         archive_s = whole_process(("fit", "--archive", *VESSEL, *SCALE, "--out", str(folder / f"batch{workers[-1]}")))[
             0
         ]
-        kept = _archive(folder, (1, 2) if quick else (10, 60))
+        kept = _archive(folder, (10, 110) if quick else (50, 550), 1 if quick else 5)
     rows = [
         row
         for what, times in (
@@ -154,11 +155,11 @@ def _speed(what: str, times: dict[int, float]) -> list[Row | Timed]:
 
 
 def _trivial(address: str) -> float:
-    """Return what a task that does nothing takes, from being sent to its result [s]: the median of five rounds."""
+    """Return what a task that does nothing takes, from being sent to its result [s]: the median of three rounds."""
     with Client(address, set_as_default=False) as client:  # type: ignore[no-untyped-call]
         client.gather(client.map(abs, range(-TRIVIAL, 0), pure=False))
         rounds = []
-        for _ in range(5):
+        for _ in range(3):
             start = time.perf_counter()
             client.gather(client.map(abs, range(-TRIVIAL, 0), pure=False))
             rounds.append((time.perf_counter() - start) / TRIVIAL)
@@ -187,28 +188,48 @@ def _traffic(paths: Sequence[Path], recipe: Path, out: Path, address: str) -> Tr
 
 @dataclass(frozen=True)
 class Archive:
-    """What one more log takes of a fit over the archive: time [s], memory and what is kept of it [bytes]."""
+    """What one more log takes of a fit over the archive: time [s], memory and what is kept of it [bytes].
 
+    Attributes
+    ----------
+    logs
+        Numbers of logs of the archives that were compared.
+    log_s
+        Median of the differences of neighbouring runs, by log.
+    least_s, most_s
+        The smallest of these and the largest.
+    """
+
+    logs: tuple[int, int]
     log_s: float
+    least_s: float
+    most_s: float
     log_memory: float
     log_kept: float
 
 
-def _archive(folder: Path, counts: tuple[int, int]) -> Archive:
-    """Measure fits over archives of two numbers of logs of two hours."""
-    found = []
-    for count in counts:
-        out = folder / f"season{count}"
+def _archive(folder: Path, counts: tuple[int, int], repeats: int) -> Archive:
+    """Measure fits over archives of two numbers of logs of two hours, in turn.
+
+    They are so far apart that what the larger one takes more is far above how much runs differ.
+    """
+    outs = [folder / f"season{count}" for count in counts]
+    for out, count in zip(outs, counts, strict=True):
         out.mkdir()
-        season(out, count)
-        kept = sum(path.stat().st_size for path in out.glob("logs/*/*") if not path.name.startswith("windows"))
-        took, memory = zip(*(whole_process((*FIT, "--out", str(out))) for _ in range(3)), strict=True)
-        found.append((statistics.median(took), max(memory), kept))
-    (few_s, few_memory, few_kept), (many_s, many_memory, many_kept) = found
+        season(out, count, weak=False)
+    few_kept, many_kept = (sum(path.stat().st_size for path in out.glob("logs/*/*")) for out in outs)
+    few, many = zip(*([whole_process((*FIT, "--out", str(out))) for out in outs] for _ in range(repeats)), strict=True)
+    return added(counts, few, many, many_kept - few_kept)
+
+
+def added(
+    counts: tuple[int, int], few: Sequence[tuple[float, int]], many: Sequence[tuple[float, int]], kept: float
+) -> Archive:
+    """Return what a log adds by times [s] and memory [bytes] of fits over two numbers of logs, run by run."""
     more = counts[1] - counts[0]
-    return Archive(
-        max(many_s - few_s, 0.0) / more, max(many_memory - few_memory, 0.0) / more, (many_kept - few_kept) / more
-    )
+    times = [(b[0] - a[0]) / more for a, b in zip(few, many, strict=True)]
+    memory = max(much for _, much in many) - max(much for _, much in few)
+    return Archive(counts, statistics.median(times), min(times), max(times), memory / more, kept / more)
 
 
 def _overhead(found: Measured, logs: int) -> Iterator[str]:
@@ -255,8 +276,9 @@ def _projected(log: LogTimes, task: dict[int, float], moved: Traffic, kept: Arch
     )
     yield (
         f"With workers of a core like these: {each}. In that are {task_s * logs:.3g} s of the scheduler, and "
-        f"{kept.log_s * logs:.3g} s of the fit over the archive in one process ({kept.log_s * 1e3:.2g} ms a log). The "
-        f"scheduler could keep {log_s / task_s:.2g} workers busy."
+        f"{kept.log_s * logs:.3g} s of the fit over the archive in one process ({kept.log_s * 1e3:.2g} ms a log, by archives "
+        f"of {kept.logs[0]} and {kept.logs[1]} logs, from {kept.least_s * 1e3:.2g} to {kept.most_s * 1e3:.2g} ms in single "
+        f"runs). The scheduler could keep {log_s / task_s:.2g} workers busy."
     )
     terabytes = moved.read * rows / log.least * logs / 1e12
     yield (

@@ -13,15 +13,22 @@ from ferryid.batch.kept import key_of, read_row, write_row
 from ferryid.batch.log_result import LogFile
 from ferryid.simulate import load_scenario, simulate, write_log
 from tests.bench.page import Row, Section, Timed, faster_row
-from tests.bench.processes import floor, whole_process
+from tests.bench.processes import floor, where, whole_process
 from tests.bench.trials import SCALE, VESSEL
 
 TABLES = ("numpy", "pyarrow", "pyarrow.parquet", "typer")
 """Packages that any program needs which has a command line and writes Parquet."""
 STATISTICS = ("scipy.linalg", "scipy.special")
 """What a fit needs besides: banded equations, and quantiles of its intervals."""
-COMPILED = ("numpy", "numba", "scipy.linalg.cython_blas", "typer")
-"""What a simulation needs: numba loads the third with the first compiled function, whatever that calls."""
+COMPILED = ("numpy", "numba", "typer")
+"""What a simulation needs."""
+STAGES = {
+    "reading": ":read_logs",
+    "forces that act the wrong way": ":refuse_reversed_forces",
+    "length of the windows": ":best_length",
+    "wind and gusts of each log": "/identify/weak_data.py:conditions",
+    "runs of the model without the measured motion": ":free_runs",
+}
 ROUND = """
 schema = "ferryid.scenario/1"
 title = "One round of the 12-corner path"
@@ -51,13 +58,17 @@ def run(quick: bool) -> Section:
         ]
         resume = _resumable(folder / "batch", logs)
         rows.append(_row(f"ferryid batch, {logs} logs and nothing to do", _times([resume] * repeats), 5.0))
-        fits = [("fit", str(trial), *VESSEL, *SCALE, "--out", str(folder / f"floor{number}")) for number in range(4)]
+        fits = [("fit", str(trial), *VESSEL, *SCALE, "--out", str(folder / f"floor{number}")) for number in range(6)]
         simulation = ("simulate", str(scenario), *log)
+        of_fit, bare, simulated, resumed = (row.took_s for row in rows if isinstance(row, Timed))
         floors = [
-            floor("`fit` of 24 min", fits[0], fits[1], (*TABLES, *STATISTICS, "matplotlib.figure")),
-            floor("`fit --no-report`", (*fits[2], "--no-report"), (*fits[3], "--no-report"), (*TABLES, *STATISTICS)),
-            floor("`simulate` of 12 min", simulation, simulation, COMPILED),
-            floor(f"`batch` of {logs} logs and nothing to do", resume, resume, ("numpy", "typer")),
+            floor("`fit` of 24 min", of_fit, fits[0], fits[1], (*TABLES, *STATISTICS, "matplotlib.figure")),
+            floor(
+                "`fit --no-report`", bare, (*fits[2], "--no-report"), (*fits[3], "--no-report"), (*TABLES, *STATISTICS)
+            ),
+            *where(STAGES, (*fits[4], "--no-report"), {"`fit --no-report`": (*fits[5], "--no-report")}),
+            floor("`simulate` of 12 min", simulated, simulation, simulation, COMPILED),
+            floor(f"`batch` of {logs} logs and nothing to do", resumed, resume, resume, ("numpy", "typer")),
         ]
     notes = (
         *floors,

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import statistics
-import subprocess
-import sys
 import tempfile
+from collections.abc import Mapping
+from math import nan
 from pathlib import Path
 
 import numpy as np
@@ -14,44 +13,28 @@ import numpy as np
 from ferryid.signals.recording import record
 from ferryid.vessel import load_profile
 from tests.bench.page import Curve, Row, Section, Timed, duration
-from tests.bench.processes import floor, whole_process
+from tests.bench.processes import floor, where, whole_process
 from tests.bench.trials import VESSEL, written
 
 LENGTHS_S = {720: 5.0, 1440: 8.0, 3600: 45.0, 7200: 90.0}
 """Lengths of a single log [s], and the goal of each [s]; six hours are measured with gaps, in `tests.bench.long`."""
 REPEATED_S, REPEATS = 720, 3
 """Logs up to this length [s] are diagnosed so many times, and the median counts."""
-LOGS = {2: None, 7: None, 14: 20.0}
+LOGS = {2: None, 5: None, 14: 20.0}
 """Logs of seven minutes in a campaign, and the goal of as many [s]."""
 LINEAR = 1.1
 """Most power of the length, and of the number of logs, with which the time may grow."""
 STAGES = {
-    "reading and sensor checks": "gather",
-    "several logs together": "judge_campaign",
-    "selecting effects": "select",
-    "judging": "judge",
-    "learning what is left": "learn",
+    "reading and sensor checks": "/diagnose/:gather",
+    "several logs together": "/diagnose/:judge_campaign",
+    "selecting effects": "/diagnose/:select",
+    "judging": "/diagnose/:judge",
+    "of that the interval of an onset or end": "/judging/findings.py:_time",
+    "learning what is left": "/diagnose/:learn",
+    "page and figures": "/report/diagnosis_report.py:report",
 }
-"""Functions whose time, all that they call included, is a stage's."""
-SHOWN = 8
-"""Functions that are listed by the time that they take themselves."""
-PROFILE = """
-import cProfile, json, pstats, sys
-from ferryid import api
-from ferryid.side_by_side import keep_to_one_thread
-keep_to_one_thread()
-logs, out, stages = sys.argv[1].split(","), sys.argv[2], sys.argv[3].split(",")
-api.diagnose(logs, "milliampere", out)
-profile = cProfile.Profile()
-profile.runcall(api.diagnose, logs, "milliampere", out)
-found = pstats.Stats(profile)
-by_stage = {one: 0.0 for one in stages}
-for (file, _, name), (_, _, own, whole, _) in found.stats.items():
-    if name in by_stage and "/diagnose/" in file:
-        by_stage[name] = max(by_stage[name], whole)
-own = sorted(((value[2], f"{key[0].rpartition('/')[2]}:{key[2]}") for key, value in found.stats.items()), reverse=True)
-print(json.dumps({"total": found.total_tt, "stages": by_stage, "own": own[:20]}))
-"""
+PROFILED_S = (720, 1440)
+"""Lengths of the logs whose diagnosis is profiled [s]."""
 
 
 def run(quick: bool) -> Section:
@@ -63,7 +46,7 @@ def run(quick: bool) -> Section:
         single = {seconds: [written(folder, 0, seconds)] for seconds in lengths}
         part_s = 200 if quick else 420
         together = {count: [written(folder, 1 + k, part_s) for k in range(count)] for count in logs}
-        rows, curves = list[Row | Timed](), list[Curve]()
+        rows, curves, shortest_s = list[Row | Timed](), list[Curve](), nan
         for title, against, kind, goals in (
             ("{:.0f} min", "length [min]", single, lengths),
             (f"campaign of {{:.0f}} logs of {part_s / 60:.2g} min", "number of logs", together, logs),
@@ -75,6 +58,8 @@ def run(quick: bool) -> Section:
                 size = number / 60 if kind is single else number
                 times[size] = took
                 rows.append(_row(title.format(size), took, much, goals[number], next(iter(times.values()))))
+            if kind is single:
+                shortest_s = times[min(times)]
             if len(times) > 1:
                 curves.append(
                     Curve(f"diagnose, {'one log' if kind is single else 'campaign'}", against, list(times.items()))
@@ -85,13 +70,14 @@ def run(quick: bool) -> Section:
             *(_growth(curve) for curve in curves),
             floor(
                 f"`diagnose` of {min(single) / 60:.0f} min",
+                shortest_s,
                 *(
                     ("diagnose", str(*single[min(single)]), *VESSEL, "--out", str(folder / out))
                     for out in ("out", "out")
                 ),
                 ("numpy", "numba", "scipy.optimize", "scipy.signal", "pyarrow.parquet", "matplotlib.figure", "typer"),
             ),
-            *_where(folder, single[min(single)], f"a log of {min(single) / 60:.0f} min"),
+            *_where(folder, {seconds: paths for seconds, paths in single.items() if quick or seconds in PROFILED_S}),
         ]
     return Section("Diagnosis", rows, notes, curves=curves)
 
@@ -122,12 +108,10 @@ def _growth(curve: Curve) -> str:
     return f"Time of {curve.what} grows with the {what} to the power of {power:.2f} ({points}), {word} {LINEAR:g}."
 
 
-def _where(folder: Path, paths: list[Path], what: str) -> list[str]:
-    """Return where the time of a diagnosis goes: by stage, and the functions that take most themselves."""
-    arguments = (",".join(map(str, paths)), str(folder / "profiled"), ",".join(STAGES.values()))
-    made = subprocess.run([sys.executable, "-c", PROFILE, *arguments], capture_output=True, text=True, check=True)
-    found = json.loads(made.stdout.splitlines()[-1])
-    total = found["total"]
-    stages = "; ".join(f"{title} {found['stages'][name] / total:.0%}" for title, name in STAGES.items())
-    own = "; ".join(f"`{name}` {took / total:.0%}" for took, name in found["own"][:SHOWN])
-    return [f"Where the time of {what} goes, on one thread: {stages}. By function, without what it calls: {own}."]
+def _where(folder: Path, logs: Mapping[int, list[Path]]) -> list[str]:
+    """Return where the time of diagnoses goes, of logs by their length [s]."""
+    words = {
+        f"a log of {seconds / 60:.0f} min": ("diagnose", *map(str, paths), *VESSEL, "--out", str(folder / "profiled"))
+        for seconds, paths in logs.items()
+    }
+    return where(STAGES, next(iter(words.values())), words)

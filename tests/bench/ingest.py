@@ -7,6 +7,7 @@ import importlib.util
 import math
 import os
 import shutil
+import sqlite3
 import statistics
 import subprocess
 import sys
@@ -14,6 +15,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -22,24 +24,28 @@ import lz4.frame
 import zstandard
 from rosbags.rosbag1 import Reader as Rosbag1Reader
 
-from ferryid.ingest import mcap_batches, mcap_chunks, open_log, rosbag1_messages, rosbag1_reader
+from ferryid.ingest import (
+    mcap_batches,
+    mcap_chunks,
+    mcap_reader,
+    open_log,
+    rosbag1_messages,
+    rosbag1_reader,
+    sqlite_data,
+    sqlite_rows,
+)
 from ferryid.ingest.bulk import BulkDecoder
 from ferryid.signals import cache, recording
 from ferryid.signals.recording import log_name, read_recording, record
 from ferryid.vessel import load_profile
 from tests.bench import logs, rivals
-from tests.bench.page import Row, Section, duration, faster, faster_row, in_turn
+from tests.bench.page import Row, Section, duration, faster, faster_row, in_turn, within_row
 from tests.bench.processes import floor
 
 PROFILE = Path(__file__).with_name("bench.toml")
-PLAIN = (
-    ("mcap", "zstd"),
-    ("mcap", "lz4"),
-    ("mcap", "none"),
-    ("bag", "lz4"),
-    ("bag", "none"),
-    ("db3", "none"),
-)
+FORMATS = {"mcap": ("zstd", "lz4", "none"), "bag": ("lz4", "none"), "db3": ("none",)}
+PLAIN = tuple((kind, compression) for kind, compressions in FORMATS.items() for compression in compressions)
+CAMERA = (("mcap", "none"), ("db3", "none"), ("mcap", "zstd"), ("mcap", "lz4"))
 NAMES = {"mcap": "MCAP", "bag": "ROS1", "db3": "db3"}
 ROSBAGS = "rosbags → pandas → Parquet"
 
@@ -130,29 +136,28 @@ def parquet_of(log: Path) -> Callable[[], None]:
 def against_rosbags(folder: Path, short: float, long: float) -> list[Row]:
     """Log → Parquet, without the content hash, which the rival does not make, and with it.
 
-    The rival is timed on the short log of the same format in the same rounds, as a machine changes its speed within a run:
-    nearly all that it takes is deserialising, whatever the compression, and grows with the number of messages.
+    The rival is timed on the short log of the same format in the same rounds, as a machine changes its speed within a run, once
+    a round: nearly all that it takes is deserialising, whatever the compression, and grows with the number of messages.
     """
-    rivals_logs = {
-        kind: logs.log(folder, kind, compression, short) for kind, compression in dict(reversed(PLAIN)).items()
-    }
-    rows = []
-    for minutes in dict.fromkeys((short, long)):
-        for kind, compression in PLAIN:
+    lengths = tuple(dict.fromkeys((short, long)))
+    rows: dict[tuple[float, str, str], list[Row]] = {}
+    for kind, compressions in FORMATS.items():
+        measured = [(minutes, compression) for minutes in lengths for compression in compressions]
+        works: list[Callable[[], object]] = [partial(by_rosbags, logs.log(folder, kind, compressions[-1], short))]
+        for minutes, compression in measured:
             log = logs.log(folder, kind, compression, minutes)
+            columns(log)
+            works += [partial(columns_to_parquet, log), partial(ingest, log)]
+        of_short, *ours = in_turn(works, 3)
+        for (minutes, compression), bare, whole in zip(measured, ours[::2], ours[1::2], strict=True):
             goal = None if minutes < 120 else 15.0 if kind == "db3" else 35.0
             what = f"{minutes:g} min {NAMES[kind]} {compression}: log → Parquet"
-            columns(log)
-            works = [
-                lambda log=log: columns_to_parquet(log),
-                lambda log=log: ingest(log),
-                lambda log=rivals_logs[kind]: by_rosbags(log),
-            ]
-            bare, whole, of_short = in_turn(works, 3)
             theirs = [took * minutes / short for took in of_short]
-            rows.append(faster_row(what, bare, ROSBAGS, theirs, goal))
-            rows.append(faster_row(f"{what}, with content hash", whole, ROSBAGS, theirs, None))
-    return rows
+            rows[minutes, kind, compression] = [
+                faster_row(what, bare, ROSBAGS, theirs, goal),
+                faster_row(f"{what}, with content hash", whole, ROSBAGS, theirs, None),
+            ]
+    return [row for minutes in lengths for kind, compression in PLAIN for row in rows[minutes, kind, compression]]
 
 
 def against_least_work(folder: Path, minutes: float) -> tuple[list[Row], list[str], float]:
@@ -164,36 +169,47 @@ def against_least_work(folder: Path, minutes: float) -> tuple[list[Row], list[st
         The rows, where the time between goes, and what decompressing the MCAP log in zstd takes [s].
     """
     rows, notes, zstd_s = [], [], math.nan
-    for kind, compression in PLAIN[:5]:
+    for kind, compression in PLAIN:
         log = logs.log(folder, kind, compression, minutes)
         name = f"{minutes:g} min {NAMES[kind]} {compression}"
-        ours, unpacked, written = in_turn(
-            (lambda log=log: columns_to_parquet(log), decompress(log), parquet_of(log)), 5
+        reading, told, goal = (
+            (every_row(log), "fetch all rows by sqlite3", None)
+            if kind == "db3"
+            else (decompress(log), "decompress all", 1.5 if compression == "zstd" else 2.0)
         )
-        ratio = statistics.median(a / (b + c) for a, b, c in zip(ours, unpacked, written, strict=True))
-        middle, unpacked_s, written_s = map(statistics.median, (ours, unpacked, written))
+        ours, unpacked, written = in_turn((partial(columns_to_parquet, log), reading, parquet_of(log)), 3)
+        unpacked_s, written_s = map(statistics.median, (unpacked, written))
         if (kind, compression) == PLAIN[0]:
             zstd_s = unpacked_s
-        goal = 1.5 if compression == "zstd" else 2.0
-        rows.append(
-            Row(
-                f"{name}: read + write",
-                duration(middle),
-                "decompress all + write the same Parquet",
-                duration(unpacked_s + written_s),
-                ratio,
-                f"≤ {goal:g}",
-                ratio <= goal,
-            )
-        )
+        least = [a + b for a, b in zip(unpacked, written, strict=True)]
+        row = within_row(f"{name}: read + write", ours, f"{told} + write the same Parquet", least, goal)
+        rows.append(row)
         notes.append(
-            f"{name}: decompressing takes {duration(unpacked_s)} and writing {duration(written_s)}; of the "
-            f"{duration(middle)} of both and what is between, {between(log)}."
+            f"{name}: to {told} takes {duration(unpacked_s)} and writing {duration(written_s)}; of the {row.ours} of both and "
+            f"what is between, {between(partial(columns_to_parquet, log))}."
         )
     return rows, notes, zstd_s
 
 
+def every_row(log: Path) -> Callable[[], None]:
+    """Return the least that reading a db3 log by Python's own sqlite3 can be: every message fetched, and none decoded."""
+    (file,) = log.glob("*.db3")
+
+    def work() -> None:
+        with contextlib.closing(sqlite3.connect(file)) as connection:
+            for _ in connection.execute("SELECT topic_id, timestamp, data FROM messages"):
+                pass
+
+    return work
+
+
 STEPS: Mapping[str, tuple[tuple[Any, str], ...]] = {
+    "opening, summary and index": (
+        (mcap_reader.McapLog, "__init__"),
+        (rosbag1_reader.Rosbag1Reader, "__init__"),
+        (sqlite_rows, "read_numbers"),
+    ),
+    "fetching rows": ((sqlite_data, "_piece"),),
     "decompressing": ((mcap_batches, "_unpacked"), (rosbag1_reader, "decompressed")),
     "checksums of chunks": ((mcap_chunks, "check"),),
     "finding messages and holding them against the index": (
@@ -208,8 +224,8 @@ STEPS: Mapping[str, tuple[tuple[Any, str], ...]] = {
 """Functions whose processor time, in whatever thread, is a step's; that of checksums is taken from decompressing's."""
 
 
-def between(log: Path) -> str:
-    """Return the processor time of the steps of reading and writing a log, as a part of a sentence."""
+def between(read: Callable[[], object]) -> str:
+    """Return the processor time of the steps of reading a log, and of writing it, as a part of a sentence."""
     took = dict.fromkeys(STEPS, 0.0)
 
     def timed(step: str, function: Callable[..., Any]) -> Callable[..., Any]:
@@ -227,7 +243,7 @@ def between(log: Path) -> str:
             for owner, name in functions:
                 stack.enter_context(patch.object(owner, name, timed(step, getattr(owner, name))))
         start = time.process_time()
-        columns_to_parquet(log)
+        read()
         whole_s = time.process_time() - start
     took["decompressing"] -= min(took["checksums of chunks"], took["decompressing"])
     rest_s = max(whole_s - sum(took.values()), 0.0)
@@ -235,37 +251,43 @@ def between(log: Path) -> str:
     return f"processor time by steps, over {os.cpu_count()} cores: {', '.join(parts)}, the rest {duration(rest_s)}"
 
 
-def against_whole_camera_log(folder: Path, minutes: float) -> list[Row]:
-    """A log that is nearly all pictures: reading the signals, against reading or decompressing everything."""
-    rows = []
-    for kind, compression in (("mcap", "none"), ("db3", "none"), ("mcap", "zstd"), ("mcap", "lz4")):
+def against_whole_camera_log(folder: Path, minutes: float) -> tuple[list[Row], str]:
+    """A log that is nearly all pictures: reading the signals, against reading or decompressing everything.
+
+    Returns
+    -------
+    tuple
+        The rows, and where the time of the first of them goes.
+    """
+    rows, note = [], ""
+    for kind, compression in CAMERA:
         log = logs.log(folder, kind, compression, minutes, camera=True)
         what = f"{minutes:g} min {NAMES[kind]} {compression} with camera: read"
         columns(log)
         if compression == "none":
             file = next(log.glob("*.db3")) if log.is_dir() else log
-            rows.append(faster(what, lambda log=log: columns(log), "cat", lambda file=file: cat(file), 1.0, 3))
+            rows.append(faster(what, partial(columns, log), "cat", partial(cat, file), 1.0, 5))
+            note = note or f"{what}: {between(partial(columns, log))}."
         else:
             rows.append(faster(what, lambda log=log: columns(log), "decompress all", decompress(log), 4.0, 3))
-    return rows
+    return rows, note
 
 
 def cat(file: Path) -> None:
     subprocess.run(["cat", file], stdout=subprocess.DEVNULL, check=True)
 
 
-def against_rerun(folder: Path, minutes: float) -> list[Row]:
-    """The same fields as NumPy arrays; nothing where rerun-sdk is not installed."""
+def against_rerun(folder: Path, minutes: float) -> tuple[list[Row], list[str]]:
+    """The same fields as NumPy arrays, and where the time goes; nothing where rerun-sdk is not installed."""
     try:
         import rerun  # noqa: F401
     except ImportError:
-        return []
+        return [], []
     log = logs.log(folder, "mcap", "zstd", minutes)
     what = f"{minutes:g} min MCAP zstd: the same fields as arrays"
     rivals.rerun_columns(log)
-    return [
-        faster(what, lambda: columns(log), "rerun-sdk", lambda: rivals.rerun_columns(log), 2.0, 5),
-    ]
+    row = faster(what, lambda: columns(log), "rerun-sdk", lambda: rivals.rerun_columns(log), 2.0, 5)
+    return [row], [f"{what}: {between(partial(columns, log))}."]
 
 
 OURS = "from ferryid.cli.main import main; main()"
@@ -299,35 +321,33 @@ def rival_process(log: Path, before: str = "", code: str = THEIRS) -> str:
         return script(before + code, log, out)
 
 
-def as_process(folder: Path, minutes: float, repeats: int) -> list[Row]:
-    """One whole process, start-up included; where they are installed, against the fastest readers in Python as well."""
-    rows = [
-        faster(
-            f"{minutes:g} min {NAMES[kind]} {compression}: whole process",
-            lambda log=log: process(log),
-            "rosbags and pandas in a process",
-            lambda log=log: rival_process(log),
-            8.0,
-            repeats,
-        )
-        for kind, compression in (("mcap", "zstd"), ("bag", "lz4"), ("db3", "none"))
-        for log in (logs.log(folder, kind, compression, minutes),)
-    ]
-    if not all(importlib.util.find_spec(name) for name in ("small_mcap", "mcap_ros2_support_fast")):
-        return rows
-    log = logs.log(folder, "mcap", "zstd", minutes)
-    for told, code in (("the mapped topics", SMALL_MCAP), ("all topics", SMALL_MCAP_ALL)):
-        rows.append(
-            faster(
-                f"{minutes:g} min MCAP zstd: whole process",
-                lambda: process(log),
-                f"small-mcap with mcap-ros2-support-fast and pandas, {told}",
-                lambda code=code: rival_process(log, code=code),
-                1.0,
-                repeats,
-            )
-        )
-    return rows
+def as_process(folder: Path, minutes: float, repeats: int) -> tuple[list[Row], list[str]]:
+    """One whole process, start-up included; where they are installed, against the fastest readers in Python as well.
+
+    Returns
+    -------
+    tuple
+        The rows, and what of them nothing can save.
+    """
+    rows, notes = [], []
+    more = all(importlib.util.find_spec(name) for name in ("small_mcap", "mcap_ros2_support_fast"))
+    for kind, compression in (("mcap", "zstd"), ("bag", "lz4"), ("db3", "none")):
+        log = logs.log(folder, kind, compression, minutes)
+        others = [("rosbags and pandas in a process", THEIRS, 8.0)]
+        if more and kind == "mcap":
+            name = "small-mcap with mcap-ros2-support-fast and pandas"
+            others += [(f"{name}, the mapped topics", SMALL_MCAP, 1.0), (f"{name}, all topics", SMALL_MCAP_ALL, 1.0)]
+        works: list[Callable[[], object]] = [partial(process, log)]
+        works += [partial(rival_process, log, code=code) for _, code, _ in others]
+        ours, *theirs = in_turn(works, repeats)
+        with scratch() as first, scratch() as second:
+            words = [("ingest", str(log), "--vessel", str(PROFILE), "--out", str(out)) for out in (first, second)]
+            packages = ("numpy", "pyarrow", "pyarrow.parquet", "typer")
+            told = f"`ingest` of {minutes:g} min {NAMES[kind]} {compression}"
+            notes.append(floor(told, statistics.median(ours), *words, packages))
+        what = f"{minutes:g} min {NAMES[kind]} {compression}: whole process"
+        rows += [faster_row(what, ours, name, took, goal) for (name, _, goal), took in zip(others, theirs, strict=True)]
+    return rows, notes
 
 
 def peak_mb(said: str) -> float:
@@ -360,19 +380,20 @@ def run(quick: bool, folder: Path | None = None) -> Section:
     """
     folder = folder or Path(tempfile.gettempdir()) / "ferryid-bench-logs"
     short, long, camera = (1.0, 1.0, 0.2) if quick else (12.0, 120.0, 3.0)
+    logs.make(
+        folder,
+        [
+            *((*one, minutes, False) for minutes in (short, long) for one in PLAIN),
+            *((*one, camera, True) for one in CAMERA),
+        ],
+    )
     rows = against_rosbags(folder, short, long)
     least, between_notes, zstd_s = against_least_work(folder, long)
     rows += least
-    rows += against_whole_camera_log(folder, camera)
-    rows += against_rerun(folder, short)
-    rows += as_process(folder, short, 1 if quick else 3)
-    rows += memory(folder, long)
-    with scratch() as first, scratch() as second:
-        words = [
-            ("ingest", str(logs.log(folder, "mcap", "zstd", short)), "--vessel", str(PROFILE), "--out", str(out))
-            for out in (first, second)
-        ]
-        process_note = floor(f"`ingest` of {short:g} min", *words, ("numpy", "pyarrow", "pyarrow.parquet", "typer"))
+    with_camera, camera_note = against_whole_camera_log(folder, camera)
+    by_rerun, rerun_notes = against_rerun(folder, short)
+    processes, process_notes = as_process(folder, short, 1 if quick else 3)
+    rows += [*with_camera, *by_rerun, *processes, *memory(folder, short)]
     return Section(
         "Ingestion",
         rows,
@@ -383,7 +404,9 @@ def run(quick: bool, folder: Path | None = None) -> Section:
             "writes the same fields. `ferryid ingest` also hashes the log, in a thread beside; so do the whole processes. "
             f"The rival is timed on the log of {short:g} min of each format in the same rounds, and multiplied for {long:g}.",
             *between_notes,
-            process_note,
+            camera_note,
+            *rerun_notes,
+            *process_notes,
             f"Logs with camera hold raw 1280 x 720 pictures at {logs.CAMERA_HZ:g} Hz, {camera:g} minutes, about "
             f"{camera * 0.332:.2g} GB (the goal was set on 3.9 GB).",
         ),

@@ -5,10 +5,13 @@ They are made with the writers of rosbags and mcap, never with ours, and reused 
 
 from __future__ import annotations
 
+import os
 import shutil
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -234,6 +237,21 @@ def write_db3(path: Path, streams: list[Messages], compression: str) -> None:
 WRITERS = {"mcap": write_mcap, "bag": write_bag, "db3": write_db3}
 
 
+def make(folder: Path, wanted: Iterable[tuple[str, str, float, bool]]) -> None:
+    """Make those of the logs that the folder does not hold, each as the arguments of `log`, on all cores: nothing is timed."""
+    missing = [one for one in dict.fromkeys(wanted) if not _place(folder, *one).exists()]
+    # The longest take most, and come first.
+    missing.sort(key=lambda one: one[2], reverse=True)
+    if missing:
+        with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as workers:
+            list(workers.map(log, [folder] * len(missing), *zip(*missing, strict=True)))
+
+
+def _place(folder: Path, kind: str, compression: str, minutes: float, camera: bool) -> Path:
+    ending = "" if kind == "db3" else f".{kind}"
+    return folder / f"{'camera' if camera else 'plain'}_{minutes:g}min_{kind}_{compression}{ending}"
+
+
 def log(folder: Path, kind: str, compression: str, minutes: float, camera: bool = False) -> Path:
     """Return the log asked for, made first if the folder does not hold it yet.
 
@@ -251,8 +269,7 @@ def log(folder: Path, kind: str, compression: str, minutes: float, camera: bool 
         Add raw 1280 x 720 frames at 2 Hz: 0.33 GB a minute.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    ending = "" if kind == "db3" else f".{kind}"
-    path = folder / f"{'camera' if camera else 'plain'}_{minutes:g}min_{kind}_{compression}{ending}"
+    path = _place(folder, kind, compression, minutes, camera)
     if path.exists():
         return path
     streams = [messages(topic, minutes, ros1=kind == "bag") for topic in TOPICS]

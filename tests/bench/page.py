@@ -156,14 +156,11 @@ def faster(
     return faster_row(what, mine, name, theirs, goal)
 
 
-def within(
-    what: str, ours: Callable[[], object], name: str, limit: Callable[[], object], goal: float, repeats: int
-) -> Row:
-    """Measure how many times as long ours takes as the least work conceivable."""
-    mine, least = in_turn((ours, limit), repeats)
-    ratio = statistics.median(a / b for a, b in zip(mine, least, strict=True))
-    values = duration(statistics.median(mine)), name, duration(statistics.median(least)), ratio
-    return Row(what, *values, f"≤ {goal:g}", ratio <= goal)
+def within_row(what: str, ours: Sequence[float], name: str, limit: Sequence[float], goal: float | None) -> Row:
+    """Row of how many times as long ours takes as the least work conceivable, of times of the same rounds [s]."""
+    ratio = statistics.median(a / b for a, b in zip(ours, limit, strict=True))
+    values = duration(statistics.median(ours)), name, duration(statistics.median(limit)), ratio
+    return Row(what, *values) if goal is None else Row(what, *values, f"≤ {goal:g}", ratio <= goal)
 
 
 def duration(value_s: float) -> str:
@@ -250,7 +247,11 @@ def page(sections: Sequence[Section], quick: bool, pictures: Sequence[tuple[str,
         lines += ["", *(f"- {note}" for note in section.notes), ""]
     parts = ", ".join(f"{section.title} {section.took_s:.0f} s" for section in sections)
     whole_s = sum(section.took_s for section in sections)
-    lines += ["## How long this page takes", "", f"{whole_s / 60:.1f} minutes: {parts}."]
+    lines += [
+        "## How long this page takes",
+        "",
+        f"{whole_s / 60:.1f} minutes, the yardstick and making logs among them: {parts}.",
+    ]
     return "\n".join(lines).rstrip() + "\n"
 
 
