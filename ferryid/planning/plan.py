@@ -91,8 +91,8 @@ class Chosen:
     begin_s, end_s
         When it begins and ends [s].
     gain
-        By how much it brings down the mean logarithm of the coefficients' standard deviations, beside those before it, and
-        with pairs of effects to separate that of the sizes from which they do.
+        By how much it brings down the logarithm of the mean standard deviation of the coefficients, each over that of the
+        prior, beside those before it, and with pairs of effects to separate that of the sizes from which they do.
     scenario
         Of the manoeuvre by itself, where there is no path.
     orders
@@ -211,8 +211,14 @@ class Plan:
 
     @property
     def mean_ratio(self) -> float:
-        """Geometric mean of the same, which the choice of manoeuvres brings down."""
+        """Geometric mean of the same."""
         return float(np.exp(np.mean([np.log(one.planned / one.usual) for one in self.hull])))
+
+    @property
+    def expected_ratio(self) -> float:
+        """Mean deviation, over that now, after the planned trial over that after the usual one: what the choice brings down."""
+        planned, usual = (np.mean([getattr(one, name) / one.now for one in self.hull]) for name in ("planned", "usual"))
+        return float(planned / usual)
 
 
 def check_request(profile: Profile, settings: PlanSettings) -> Profile:

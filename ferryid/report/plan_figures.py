@@ -43,7 +43,7 @@ def picture(plan: Plan) -> str:
         small = ceil(len(different) / COLUMNS) * (0.36 + 1.36 * wide / long) + 0.3
         heights = [map_height, small, 3.3, rows]
         figure = Figure(figsize=(WIDTH, sum(heights)), layout="constrained")
-        of_path, of_each, of_time, of_gain = figure.subfigures(4, 1, height_ratios=heights)
+        of_path, of_each, of_time, of_gain = figure.subfigures(4, 1, height_ratios=heights, squeeze=False).flat
         _whole(of_path.subplots(), plan)
         _each(of_each, plan, plan.track, different)
         _motion(of_time, plan, plan.track)
@@ -79,7 +79,8 @@ def _spread(poses: Floats, length: float, count: int) -> list[int]:
     """Return rows at even distances of way and turn: a vessel on the spot is not drawn again and again."""
     moved = np.abs(np.diff(poses, axis=0)) @ [1.0, 1.0, 0.3 * length]
     way = np.concatenate([[0.0], np.cumsum(moved)])
-    return np.unique(np.searchsorted(way, np.linspace(0.0, way[-1], count + 1)[:-1])).tolist()
+    rows = np.searchsorted(way, np.linspace(0.0, way[-1], count + 1)[:-1])
+    return sorted(set(rows.tolist()))
 
 
 def _outline(pose: Floats, size: tuple[float, float]) -> Floats:
@@ -163,8 +164,8 @@ def _deviations(ax: Axes, plan: Plan) -> None:
     """Draw what either trial leaves of every coefficient's standard deviation, a row each."""
     y = np.arange(len(plan.hull))
     usual, planned = (np.array([getattr(one, name) / one.now for one in plan.hull]) for name in ("usual", "planned"))
-    better = planned <= usual
-    ax.hlines(y, np.minimum(usual, planned), np.maximum(usual, planned), colors=np.where(better, NEW, BASE), alpha=0.45,
+    colours = np.where(planned <= usual, NEW, BASE).tolist()
+    ax.hlines(y, np.minimum(usual, planned), np.maximum(usual, planned), colors=colours, alpha=0.45,
               linewidth=2.0)  # fmt: skip
     ax.plot(usual, y, "o", markerfacecolor="white", color=BASE, label=f"after {plan.usual}", markersize=5)
     ax.plot(planned, y, "o", color=NEW, label="after the planned trial", markersize=5)
