@@ -19,7 +19,7 @@ from ferryid.ingest import open_log
 from ferryid.ingest.hashing import content_hash
 from ferryid.models import Model
 from ferryid.planning.information import deviations, information
-from ferryid.planning.limits import Limits, limits_of
+from ferryid.planning.limits import Limits, limits_of, within
 from ferryid.planning.segments import STEP_S, segments
 from ferryid.planning.selection import choose, separated_from
 from ferryid.planning.steering import LEAD_S, Manoeuvre, manoeuvres
@@ -287,7 +287,14 @@ def _path(waters: Waters, known: Sequence[Responses], pairs: Pairs, settings: Pl
     run.progress(f"simulating {counted(len(drawn), 'manoeuvre')}")
     all_poses = [before, *(one.poses for one in drawn)]
     ends = step * np.cumsum([len(one) for one in all_poses])
-    (start, *parts), _ = waters.tells(waters.following(np.vstack(all_poses), limits), ends.tolist())
+    (start, *parts), sailed = waters.tells(waters.following(np.vstack(all_poses), limits), ends.tolist())
+    # The vessel overshoots what it is asked for, more with a quick manoeuvre: some leave the area.
+    cuts = np.searchsorted(np.linspace(0.0, ends[-1], len(sailed)), ends)
+    pieces = np.split(sailed, cuts[:-1])[1:]
+    inside = [k for k, piece in enumerate(pieces) if within(piece, area, dimensions(waters.profile)[:2])]
+    # Where none stays within, the shortest is refused or taken as the others are.
+    kept = inside or list(range(len(drawn)))
+    drawn, parts = [drawn[k] for k in kept], [parts[k] for k in kept]
     lasts = [len(one.poses) * step for one in drawn]
     chosen = choose(lasts, parts, [start, *known], pairs, seconds - len(before) * step)
     poses = _joined([before, *(drawn[k].poses for k, _ in chosen)])
@@ -308,7 +315,7 @@ def _path(waters: Waters, known: Sequence[Responses], pairs: Pairs, settings: Pl
         _expected(waters.vessel, known, usual, planned),
         _separated(pairs, known, usual, planned),
         "the twelve-corner trial of the same length",
-        len(drawn),
+        len(all_poses) - 1,
     )
 
 
@@ -329,7 +336,7 @@ def _orders(waters: Waters, known: Sequence[Responses], pairs: Pairs, settings: 
         run.progress(f"simulating manoeuvre {k} of {len(every)}")
         scenario = waters.steering(one)
         (told,), track = waters.tells(scenario, [one.duration_s])
-        sides = sorted(np.ptp(track, axis=0).tolist())
+        sides = sorted(np.ptp(track[:, :2], axis=0).tolist())
         narrowest = min(narrowest, max(sides))
         if settings.area is not None and any(
             side > room for side, room in zip(sides, sorted(settings.area), strict=True)

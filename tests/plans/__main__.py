@@ -23,7 +23,7 @@ def main() -> None:
     parser.add_argument("--vessels", type=int, default=20, help="simulated vessels")
     count = parser.parse_args().vessels
     with ProcessPoolExecutor(2, get_context("spawn")) as pool:
-        found = list(pool.map(study, (*range(count), *range(FRESH, FRESH + count))))
+        found = list(pool.map(study, (*range(count), *range(FRESH, FRESH + (count + 1) // 2))))
     page = REPORTS / "plan.md"
     page.write_text(written(found[:count], found[count:]), encoding="utf-8")
     stamp(page)
@@ -53,7 +53,7 @@ def written(found: list[Found], fresh: list[Found]) -> str:
             "",
             f"Median error after the planned trial over that after the twelve-corner trial: **{middle:.2f}** (aim {AIM:g}; "
             f"{'reached' if middle <= AIM else 'missed'}); smaller in {int(np.sum(ratios < 1.0))} of {len(found)} vessels.",
-            f"Over {len(fresh)} vessels of other seeds, which nothing was chosen by: **{of_others:.2f}**, smaller in "
+            f"Over {len(fresh)} vessels of other seeds, which no choice was made by: **{of_others:.2f}**, smaller in "
             f"{int(np.sum(others < 1.0))}.",
             *vessels,
             "",

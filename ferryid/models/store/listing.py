@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from ferryid.effects import effects
-from ferryid.models.fitted_conditions import fitted_conditions
 from ferryid.models.model import Model
 from ferryid.models.store.history import read_history
 from ferryid.models.store.versions import StoredModel, UnreadableModel, current_problems, list_models
 from ferryid.models.stored_effect import StoredEffect
+from ferryid.models.training_conditions import fitted_conditions
 
 
 def list_versions(out: Path) -> dict[str, Any]:
