@@ -4,7 +4,7 @@ from ferryid.diagnose.data.course import Course, MeasuredCourse
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.data.measurements import check_withheld
 from ferryid.diagnose.inference.group_differences import GROUPS
-from ferryid.diagnose.judging.diagnosis import SCHEMA, Diagnosis, Withheld, finding_as_json, to_json
+from ferryid.diagnose.judging.diagnosis import SCHEMA, Diagnosis, Withheld, copies_as_json, finding_as_json, to_json
 from ferryid.diagnose.judging.error_profiles import Profiled
 from ferryid.diagnose.judging.finding import UNKNOWN, Finding
 from ferryid.diagnose.judging.group_differences import Difference
@@ -37,6 +37,7 @@ __all__ = [
     "campaign_verdict",
     "check_withheld",
     "compare_groups",
+    "copies_as_json",
     "diagnose",
     "diagnose_and_store",
     "error_ratio",

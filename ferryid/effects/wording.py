@@ -23,6 +23,13 @@ def bearing(degrees: float) -> str:
     return f"{round(degrees) % 360} deg ({compass_point(degrees)})"
 
 
+def weak_evidence(evidence: float, least: float) -> str:
+    """Return that logs hardly speak for something, as the end of a sentence; evidence over none, and what is needed [nat]."""
+    if evidence < 0.05:
+        return "the logs are explained as well without it"
+    return f"the logs hardly show it: log evidence {evidence:.1f} nat over none, {least:g} are needed"
+
+
 def titled(title: str, instance: str | None) -> str:
     """Return a title with the thruster it is one of, if it is."""
     return f"{title} ({instance})" if instance else title

@@ -17,6 +17,7 @@ from ferryid.effects import effects
 from ferryid.identify.log_conditions import BlownLoad
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.weak_rows import WeakRows
+from ferryid.models import CONDITION_TITLES
 from ferryid.models.forces import ACCELERATIONS, motion_force
 from ferryid.regression import window_rows, window_weights
 from ferryid.regression.bases import Basis
@@ -113,27 +114,35 @@ def kinds_of(profile: Profile, samples: Sequence[MotionSamples]) -> tuple[Condit
     usual = IDENTIFY.wind_spread_mps
     return (
         ConditionKind(
-            WIND, "wind", (ConditionParameter("north", "m/s", usual), ConditionParameter("east", "m/s", usual))
+            WIND,
+            CONDITION_TITLES[WIND],
+            (ConditionParameter("north", "m/s", usual), ConditionParameter("east", "m/s", usual)),
         ),
         ConditionKind(
             "current",
-            "current",
+            CONDITION_TITLES["current"],
             (ConditionParameter("north", "m/s", flow["north"]), ConditionParameter("east", "m/s", flow["east"])),
         ),
         ConditionKind(
             "payload",
-            "load",
+            CONDITION_TITLES["payload"],
             (ConditionParameter("mass", "kg", mass), ConditionParameter("moment", "kg·m", mass * place)),
         ),
         ConditionKind(
-            "heading_bias", "heading error", (ConditionParameter("angle", "deg", known["heading_bias"]["angle"]),)
+            "heading_bias",
+            CONDITION_TITLES["heading_bias"],
+            (ConditionParameter("angle", "deg", known["heading_bias"]["angle"]),),
         ),
         ConditionKind(
             "velocity_offset",
-            "velocity offset",
+            CONDITION_TITLES["velocity_offset"],
             (ConditionParameter("surge", "m/s", float(trim[0])), ConditionParameter("sway", "m/s", float(trim[1]))),
         ),
-        ConditionKind("yaw_rate_offset", "yaw-rate offset", (ConditionParameter("yaw", "rad/s", float(trim[2])),)),
+        ConditionKind(
+            "yaw_rate_offset",
+            CONDITION_TITLES["yaw_rate_offset"],
+            (ConditionParameter("yaw", "rad/s", float(trim[2])),),
+        ),
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TypeVar
 
+from ferryid.effects.wording import weak_evidence
 from ferryid.identify.condition_choice import KindTest, choose_kinds
 from ferryid.identify.condition_kinds import kinds_of
 from ferryid.identify.condition_problem import hull_and_conditions
@@ -37,11 +38,11 @@ def _outcome(test: KindTest) -> KindOutcome:
         (one.name, test.spread * size, one.unit)
         for one, size in zip(test.kind.parameters, test.kind.sizes.tolist(), strict=True)
     )
-    told = f"its evidence over none is {max(test.evidence, 0.0):.1f} nat"
+    told = f"its log evidence over none is {test.evidence:.1f} nat"
     if test.included:
         reason = f"{told}, and held-out stretches are predicted no worse with it"
     elif test.evidence < IDENTIFY.condition_evidence:
-        reason = f"{told} only"
+        reason = weak_evidence(test.evidence, IDENTIFY.condition_evidence)
     elif test.within <= 0.0:
         reason = f"stretches held out within the logs are not predicted better with it, though {told}"
     elif not test.supported:

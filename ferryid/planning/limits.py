@@ -6,8 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import cos, hypot, isfinite, sin
 
+import numpy as np
+
 from ferryid.errors import FerryIdError
 from ferryid.simulate.plant.thrust import curves_of, largest_force
+from ferryid.types import Floats
 from ferryid.vessel.dimensions import dimensions
 from ferryid.vessel.profile import Profile
 
@@ -80,6 +83,25 @@ def limits_of(vessel: Profile, area: tuple[float, float]) -> Limits:
     used = [min(side, MOST_ROOM * length) for side in sorted(area, reverse=True)]
     long, wide = (0.5 * (side - length) for side in used)
     return Limits(speed, acceleration, long, wide)
+
+
+def within(poses: Floats, area: tuple[float, float], size: tuple[float, float]) -> bool:
+    """Tell whether a hull stays in an area, about its middle and its longer side to the north.
+
+    Parameters
+    ----------
+    poses
+        North, east [m] and heading [rad], shape (n, 3).
+    area
+        Its sides [m].
+    size
+        Length and beam of the hull [m].
+    """
+    long, wide = sorted(area, reverse=True)
+    c, s = np.abs(np.cos(poses[:, 2])), np.abs(np.sin(poses[:, 2]))
+    north = np.abs(poses[:, 0]) + 0.5 * (c * size[0] + s * size[1])
+    east = np.abs(poses[:, 1]) + 0.5 * (s * size[0] + c * size[1])
+    return bool(north.max() <= 0.5 * long and east.max() <= 0.5 * wide)
 
 
 def _forces(vessel: Profile) -> tuple[float, float, float]:

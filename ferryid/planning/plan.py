@@ -19,7 +19,7 @@ from ferryid.ingest import open_log
 from ferryid.ingest.hashing import content_hash
 from ferryid.models import Model
 from ferryid.planning.information import deviations, information
-from ferryid.planning.limits import Limits, limits_of
+from ferryid.planning.limits import Limits, limits_of, within
 from ferryid.planning.segments import STEP_S, segments
 from ferryid.planning.selection import choose, separated_from
 from ferryid.planning.steering import LEAD_S, Manoeuvre, manoeuvres
@@ -91,8 +91,8 @@ class Chosen:
     begin_s, end_s
         When it begins and ends [s].
     gain
-        By how much it brings down the mean logarithm of the coefficients' standard deviations, beside those before it, and
-        with pairs of effects to separate that of the sizes from which they do.
+        By how much it brings down the logarithm of the mean standard deviation of the coefficients, each over that of the
+        prior, beside those before it, and with pairs of effects to separate that of the sizes from which they do.
     scenario
         Of the manoeuvre by itself, where there is no path.
     orders
@@ -211,8 +211,14 @@ class Plan:
 
     @property
     def mean_ratio(self) -> float:
-        """Geometric mean of the same, which the choice of manoeuvres brings down."""
+        """Geometric mean of the same."""
         return float(np.exp(np.mean([np.log(one.planned / one.usual) for one in self.hull])))
+
+    @property
+    def expected_ratio(self) -> float:
+        """Mean deviation, over that now, after the planned trial over that after the usual one: what the choice brings down."""
+        planned, usual = (np.mean([getattr(one, name) / one.now for one in self.hull]) for name in ("planned", "usual"))
+        return float(planned / usual)
 
 
 def check_request(profile: Profile, settings: PlanSettings) -> Profile:
@@ -281,7 +287,14 @@ def _path(waters: Waters, known: Sequence[Responses], pairs: Pairs, settings: Pl
     run.progress(f"simulating {counted(len(drawn), 'manoeuvre')}")
     all_poses = [before, *(one.poses for one in drawn)]
     ends = step * np.cumsum([len(one) for one in all_poses])
-    (start, *parts), _ = waters.tells(waters.following(np.vstack(all_poses), limits), ends.tolist())
+    (start, *parts), sailed = waters.tells(waters.following(np.vstack(all_poses), limits), ends.tolist())
+    # The vessel overshoots what it is asked for, more with a quick manoeuvre: some leave the area.
+    cuts = np.searchsorted(np.linspace(0.0, ends[-1], len(sailed)), ends)
+    pieces = np.split(sailed, cuts[:-1])[1:]
+    inside = [k for k, piece in enumerate(pieces) if within(piece, area, dimensions(waters.profile)[:2])]
+    # Where none stays within, the shortest is refused or taken as the others are.
+    kept = inside or list(range(len(drawn)))
+    drawn, parts = [drawn[k] for k in kept], [parts[k] for k in kept]
     lasts = [len(one.poses) * step for one in drawn]
     chosen = choose(lasts, parts, [start, *known], pairs, seconds - len(before) * step)
     poses = _joined([before, *(drawn[k].poses for k, _ in chosen)])
@@ -302,7 +315,7 @@ def _path(waters: Waters, known: Sequence[Responses], pairs: Pairs, settings: Pl
         _expected(waters.vessel, known, usual, planned),
         _separated(pairs, known, usual, planned),
         "the twelve-corner trial of the same length",
-        len(drawn),
+        len(all_poses) - 1,
     )
 
 
@@ -323,7 +336,7 @@ def _orders(waters: Waters, known: Sequence[Responses], pairs: Pairs, settings: 
         run.progress(f"simulating manoeuvre {k} of {len(every)}")
         scenario = waters.steering(one)
         (told,), track = waters.tells(scenario, [one.duration_s])
-        sides = sorted(np.ptp(track, axis=0).tolist())
+        sides = sorted(np.ptp(track[:, :2], axis=0).tolist())
         narrowest = min(narrowest, max(sides))
         if settings.area is not None and any(
             side > room for side, room in zip(sides, sorted(settings.area), strict=True)

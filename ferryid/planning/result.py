@@ -37,6 +37,7 @@ def as_json(plan: Plan) -> dict[str, Any]:
         "usual": plan.usual,
         "ratio": plan.ratio if isfinite(plan.ratio) else None,
         "mean_ratio": plan.mean_ratio if isfinite(plan.mean_ratio) else None,
+        "expected_ratio": plan.expected_ratio if isfinite(plan.expected_ratio) else None,
         "coefficients": [
             {
                 "coefficient": one.name,
@@ -95,7 +96,7 @@ def summary(plan: Plan) -> str:
     """Return what the plan is expected to gain, in a sentence."""
     worse = (
         ""
-        if plan.mean_ratio < 1.0
+        if plan.expected_ratio < 1.0
         else " The usual trial shows more in this time: record that, or give more --minutes."
     )
     generic = (
@@ -105,8 +106,9 @@ def summary(plan: Plan) -> str:
     less = f" After the usual trial {listed(behind)} would be known better." if behind else ""
     already = f", beside {counted(len(plan.after), 'log')} recorded already" if plan.after else ""
     return (
-        f"Expected standard deviations of the hull's coefficients: {plan.mean_ratio:.2f} of those after {plan.usual} in "
-        f"the geometric mean of {len(plan.hull)}, {plan.ratio:.2f} in the median{already}. They are for the noise of the "
+        f"Expected standard deviations of the hull's coefficients, over those now: in the mean of {len(plan.hull)} "
+        f"{plan.expected_ratio:.2f} of that after {plan.usual}; coefficient by coefficient {plan.mean_ratio:.2f} in the "
+        f"geometric mean and {plan.ratio:.2f} in the median{already}. They are for the noise of the "
         f"simulator's sensors: they compare trials, and a recording will show larger ones.{less}{worse}{generic}"
     )
 

@@ -100,10 +100,10 @@ class Waters:
         return parse_scenario("\n".join(text) + "\n", f"{name}-plan.toml")
 
     def tells(self, scenario: Scenario, ends_s: Sequence[float]) -> tuple[list[Responses], Floats]:
-        """Return what a trial tells in each of its parts, which end at these times [s], and its track, shape (n, 2) [m]."""
+        """Return what a trial tells in each of its parts, which end at these times [s], and the poses sailed, shape (n, 3)."""
         truth, control = sail(scenario, self.vessel, scenario.seed)
         streams = sense(scenario, self.vessel, scenario.seed, truth, control)
         log = self.folder / "trial.mcap"
         write_log(Simulation(scenario, scenario.seed, self.vessel, truth, control, streams), log, overwrite=True)
         seen = replace(reading(self.vessel, mapped(self.profile)), hull=self.profile.hull)
-        return information(str(log), seen, self.keys, ends_s), truth.eta[:, :2]
+        return information(str(log), seen, self.keys, ends_s), truth.eta

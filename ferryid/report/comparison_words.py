@@ -173,11 +173,32 @@ def headline(result: ComparisonResult) -> str:
         if not shown and free:
             kept = "No fitted model is shown to have less prediction error than the profile's hull, but run free "
             kept += f"{listed(sorted(free))} {'is' if len(free) == 1 else 'are'} better. "
-        elif not shown:
+        elif shown:
+            kept = _partly(result, on, kind, shown)
+        else:
             kept = "No fitted model is shown to be better than the profile's hull: keep the hull. "
     if not told:
         return f"{kept}No error could be compared on {title}."
     return f"{kept}Least {kind} error, {title}: {'; '.join(told)}."
+
+
+def _partly(result: ComparisonResult, on: str | None, kind: str, shown: Sequence[Statement]) -> str:
+    """Return on which axes fitted models are shown to be better than their base model, where that is not so on all of them."""
+    told = []
+    for label in dict.fromkeys(row.first for row in shown):
+        against = [
+            row for row in result.statements
+            if (row.on, row.kind) == (on, kind) and {row.first, row.second} == {label, BASE} and isfinite(row.ratio)
+        ]  # fmt: skip
+        better = [row.what for row in shown if row.first == label]
+        worse = [row.what for row in against if row.better == BASE and row.evidence]
+        open_ = [row.what for row in against if row.what not in better and row.what not in worse]
+        if not worse and not open_:
+            continue
+        rest = [f"worse on {listed(worse)}"] if worse else []
+        rest += [f"not shown to be better or worse on {listed(open_)}"] if open_ else []
+        told.append(f"{label} is better than the {BASE} on {listed(better)}, {' and '.join(rest)}")
+    return f"{'; '.join(told)}. " if told else ""
 
 
 def told_horizon(scope: CommonErrors) -> int:

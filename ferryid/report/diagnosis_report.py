@@ -13,6 +13,7 @@ from ferryid.diagnose import (
     Diagnosis,
     DiagnosisSettings,
     campaign_verdict,
+    copies_as_json,
     diagnose_and_store,
     finding_as_json,
     likeness_as_json,
@@ -136,6 +137,9 @@ def as_json(diagnoses: Sequence[Diagnosis]) -> dict[str, Any]:
     if len(diagnoses) == 1:
         return to_json(diagnoses[0])
     logs, shared = [to_json(one) for one in diagnoses], findings_of_all(diagnoses)
+    for one in logs:
+        # They are the campaign's.
+        one.pop("copies", None)
     together = second_sources.of_all(diagnoses)
     if together is not None:
         for one in logs:
@@ -158,6 +162,7 @@ def as_json(diagnoses: Sequence[Diagnosis]) -> dict[str, Any]:
         "notes": [],
         "withheld": [],
         **({"second_sources": together.to_json()} if together else {}),
+        **({"copies": copies} if (copies := copies_as_json(diagnoses)) else {}),
         **next(({"learned": one.learned.to_json()} for one in diagnoses if one.learned is not None), {}),
         **next(({"likeness": likeness_as_json(one.likeness_of_all)} for one in diagnoses if one.likeness_of_all), {}),
         # What several logs teach is one model.

@@ -11,12 +11,15 @@ from ferryid.diagnose import JUDGING, UNKNOWN, Diagnosis, Estimate, Finding, wor
 from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.effects.wording import listed, timed, titled
+from ferryid.report import least_sizes
 from ferryid.report.diagnosis_errors import fitted, ratio_of
 from ferryid.types import AXES
 
 EVERYWHERE = "all along"
 INCREDIBLE = 3.0
 """Standard deviations as of which a coefficient of the hull has moved farther than is credible."""
+NAMED_UNSEEN = 3
+"""Effects of which a verdict says that the log would never have shown them; the others are counted."""
 SPANS = 4
 """Intervals that are told."""
 RIVALS = 3
@@ -82,6 +85,15 @@ def headline(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "not_testable":
         perhaps = f" Perhaps {doubtful} {'is' if len(every) == 1 else 'are'}." if doubtful else ""
         return f"Not testable: this log cannot show whether anything is missing from the {base}.{perhaps}"
+    unseen = least_sizes.never_seen(diagnosis)
+    if unseen:
+        told = listed(
+            [*unseen[:NAMED_UNSEEN], *([f"{len(unseen) - NAMED_UNSEEN} more"] if len(unseen) > NAMED_UNSEEN else [])]
+        )
+        return (
+            f"Matched as far as this log can show, which is not all: nothing is found missing from the {base}, but "
+            f"{told} would not have been seen at any size."
+        )
     return f"Matched: nothing that this log could show is missing from the {base}."
 
 

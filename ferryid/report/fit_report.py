@@ -15,7 +15,7 @@ from ferryid.identify import FitOutcome, FitSettings, fit_archive, fit_logs
 from ferryid.models import model_to_json
 from ferryid.models.store import StoredModel, assign_version, plan, save
 from ferryid.report.folder import PAGE, write_folder
-from ferryid.report.headline import headline_of
+from ferryid.report.headline import below_zero, headline_of
 from ferryid.report.interactive import write_assets
 from ferryid.report.model_text import describe_settings
 from ferryid.report.outcome import Report
@@ -25,6 +25,12 @@ from ferryid.vessel.profile import Profile
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+RELATIVE_LOADS = (
+    "relative to the hull that all logs share, positive or negative: what was aboard in every log is in that hull"
+)
+"""What the loads of single logs are, as the end of a sentence."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -188,7 +194,7 @@ def as_text(result: FitOutcome, stored: StoredModel, report: Path | None) -> str
     lines.append(f"{'R², new':<28}" + "".join(f"{_number(value):>12}" for value in scores.r2_model.tolist()))
     if model.settings.get("estimated_from"):
         lines.append("errors are those of a fit to the training rows alone, which judges the model")
-    lines.append("")
+    lines.extend([note, ""] if (note := below_zero(result)) else [""])
     for one in result.estimators:
         folds = (
             f"{_number(one.folds)} on folds of the training rows"
@@ -201,6 +207,8 @@ def as_text(result: FitOutcome, stored: StoredModel, report: Path | None) -> str
         )
     lines.extend(f"wind, estimated: {one}" for one in result.winds)
     lines.extend(f"{one.title}, estimated: {one}" for one in result.conditions)
+    if any(one.kind == "payload" and one.significant for one in result.conditions):
+        lines.append(f"loads are {RELATIVE_LOADS}")
     if result.condition_kinds and not result.conditions:
         # What each was left out for stands in the report.
         left = listed([one.title for one in result.condition_kinds])

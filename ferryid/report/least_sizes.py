@@ -18,6 +18,11 @@ def rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
     return [{"says": one.says, "size": one.text} for one in diagnosis.least_sizes]
 
 
+def never_seen(diagnosis: Diagnosis) -> list[str]:
+    """Return the effects that a log would not have shown at any size, whatever the thruster."""
+    return list(dict.fromkeys(one.effect.replace("_", " ") for one in diagnosis.least_sizes if one.value is None))
+
+
 def line(diagnosis: Diagnosis) -> str:
     """Return the sizes of some effects in one line; of several thrusters the largest counts."""
     worst: dict[str, LeastSize] = {}

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ferryid.counts import counted
-from ferryid.models import Model, model_to_json
+from ferryid.models import Model, fitted_conditions, model_to_json
 from ferryid.models.store import Change
 from ferryid.types import AXES
 
@@ -49,7 +49,7 @@ def render_listing(result: dict[str, Any], out: Path) -> str:
 def _state(row: dict[str, Any]) -> str:
     if "unreadable" in row:
         return "unreadable"
-    return "accepted" if row["accepted"] else "diagnosed" if "conditions" in row else "rejected"
+    return "accepted" if row["accepted"] else "diagnosed" if "vessel_effects" in row else "rejected"
 
 
 def _some(names: Sequence[str]) -> str:
@@ -91,6 +91,9 @@ def render_model(model: Model) -> str:
             lines.append(f"{name:<14}{one.value:>20.5g}{one.low:>13.5g}{one.high:>13.5g}  {one.unit}")
     for stored in model.vessel_effects:
         lines += ["", f"vessel: {stored.says()}", f"  found in {', '.join(one.log for one in stored.sources)}"]
+    if fitted := fitted_conditions(model):
+        lines += ["", "estimated of single logs with the hull, not in the model (95 % intervals):"]
+        lines += [f"  {log}: {one}" for log, told in fitted.items() for one in told]
     for known in model.conditions:
         lines += ["", f"only in {known.log}:", *(f"  {stored.says(known.sha256)}" for stored in known.effects)]
     return "\n".join(lines)

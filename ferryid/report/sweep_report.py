@@ -108,6 +108,7 @@ def render(found: Sweep, command: Sequence[str] = (), interactive: Interactive =
         axes=AXES,
         test_window_s=f"{found.test_window_s:g}",
         weak=found.weak,
+        error=found.error,
         tested=found.tested,
         settings={**found.settings.plain(), **found.settings.scale},
         many=len(found.windows_s) > 1,

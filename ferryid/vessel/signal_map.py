@@ -160,6 +160,13 @@ def select(profile: Profile, topics: Sequence[Topic], where: str, losses: Sequen
         if _topic(signal.topic, topics) is None:
             there = _some([topic.name for topic in topics]) or "no topic"
             reason = f"{ended(reason)} The log has {there}"
+        if not profile.path.endswith(".toml"):
+            # Of a model that brings its profile along: nobody can go to a line of it.
+            raise FerryIdError(
+                f"{where}: {signal.quantity} is needed by the profile {profile.name} that is stored in the model "
+                f"{profile.path}, {ended(f'{reason}{more}')} Fix: give a log of {profile.name}, or, where the topics of that "
+                "vessel have changed, its profile with --vessel"
+            )
         raise FerryIdError(
             f"{where}: {signal.quantity} is needed by the profile {profile.name} ({profile.path}:{signal.line}), "
             f"{ended(f'{reason}{more}')} Fix: correct the signal map, or set "

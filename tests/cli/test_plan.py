@@ -38,6 +38,7 @@ def test_a_path_for_a_vessel_that_pushes_every_way(ferryid: Command, tmp_path: P
     found = conforms(run.out)
     assert found["duration_s"] <= 360.0
     assert found["mean_ratio"] < 0.8
+    assert found["expected_ratio"] < 0.9
     names = {Path(one).name for one in found["files"]}
     assert names == {"plan.csv", "plan.toml", "plan.svg", "plan.json", "qgroundcontrol.plan"}
     assert json.loads((tmp_path / "plans" / "milliampere" / "plan.json").read_text()) == found

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from ferryid.effects import effects
-from ferryid.effects.wording import bearing, compass_point, listed
+from ferryid.effects.wording import bearing, compass_point, listed, weak_evidence
 from ferryid.vessel import load_profile
 
 
@@ -55,3 +55,15 @@ def test_a_sentence_is_true_of_a_model_that_has_the_effect(name: str) -> None:
 def test_lists_read_like_prose() -> None:
     assert [listed(list(parts)) for parts in ("", "a", "ab", "abc")] == ["", "a", "a and b", "a, b and c"]
     assert listed(["a", "b"], "or") == "a or b"
+
+
+@pytest.mark.parametrize(
+    ("evidence", "told"),
+    [
+        (-3.0, "the logs are explained as well without it"),
+        (0.0, "the logs are explained as well without it"),
+        (3.14, "the logs hardly show it: log evidence 3.1 nat over none, 8 are needed"),
+    ],
+)
+def test_weak_evidence_is_told_with_what_is_needed(evidence: float, told: str) -> None:
+    assert weak_evidence(evidence, 8.0) == told

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from importlib.resources import files
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
 
@@ -15,7 +17,7 @@ from ferryid.models.scores import ForceScores, ModelScores
 from ferryid.models.store.listing import list_versions
 from ferryid.models.store.versions import StoredModel, list_models, load, load_file, save
 from ferryid.regression.bases.basis import make_basis
-from ferryid.report.model_text import render_listing
+from ferryid.report.model_text import render_listing, render_model
 from ferryid.vessel import load_profile
 
 
@@ -198,3 +200,22 @@ def test_a_damaged_note_of_the_current_version_is_told(tmp_path: Path, text: str
     assert told in render_listing(list_versions(tmp_path), tmp_path).splitlines()[-1]
     save(made(seed=1), tmp_path)
     assert load("boat", tmp_path).version == 2
+
+
+def test_what_a_fit_estimated_of_single_logs_is_listed_and_shown(tmp_path: Path) -> None:
+    estimated = {
+        "current": {name: {"value": 0.2, "standard_error": 0.01, "unit": "m/s"} for name in ("north", "east")},
+        "payload": {"mass": {"value": -80.0, "standard_error": 10.0, "unit": "kg"}},
+    }
+    model = replace(made(), training=({**made().training[0], "conditions": estimated},))
+    save(model, tmp_path)
+    (row,) = list_versions(tmp_path)["models"]
+    current = "current: north 0.2 (0.18 to 0.22) m/s, east 0.2 (0.18 to 0.22) m/s"
+    assert row["conditions"] == {"log": [current, "load: mass -80 (-99.6 to -60.4) kg"]}
+    schema = json.loads(files("ferryid.schemas").joinpath("models.json").read_text(encoding="utf-8"))
+    jsonschema.validate(json.loads(json.dumps(list_versions(tmp_path))), schema)
+    listed = render_listing(list_versions(tmp_path), tmp_path)
+    assert f"      log: {current}" in listed.splitlines()
+    # It is the fit's own verdict all the same.
+    assert "accepted" in listed.splitlines()[1]
+    assert f"  log: {current}" in render_model(model).splitlines()

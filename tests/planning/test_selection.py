@@ -37,7 +37,7 @@ def test_deviations_are_those_of_the_posterior() -> None:
     found = told(3.0, 99.0)
     # Prior information is 1 in these units.
     assert deviations(found)[:2] == pytest.approx([0.5, 0.1])
-    assert worth_of(found, ()) == pytest.approx(-0.5 * (log(0.5) + log(0.1)))
+    assert worth_of(found, ()) == pytest.approx(-log(0.5 * (0.5 + 0.1)))
 
 
 def test_the_manoeuvre_that_tells_most_of_what_is_not_known_yet() -> None:
@@ -45,6 +45,14 @@ def test_the_manoeuvre_that_tells_most_of_what_is_not_known_yet() -> None:
     assert [k for k, _ in choose([60.0, 60.0], [ahead, aside], [], [], 130.0)] == [0, 1]
     # What is known already is not asked for again.
     assert [k for k, _ in choose([60.0, 60.0], [ahead, aside], [told(1e8, 0.0)], [], 70.0)] == [1]
+
+
+def test_half_of_what_is_not_known_is_worth_more_than_a_tenth_of_what_is() -> None:
+    # The first coefficient is known to a tenth already; the mean logarithm would ask for ten times more of it.
+    known = told(99.0, 0.0)
+    much_of_the_first, some_of_the_second = told(1e4, 0.0), told(0.0, 3.0)
+    choice = choose([60.0, 60.0], [much_of_the_first, some_of_the_second], [known], [], 60.0)
+    assert [k for k, _ in choice] == [1]
 
 
 def test_gains_add_up_to_what_all_are_worth_together() -> None:

@@ -20,6 +20,7 @@ from ferryid.planning.information import information
 from ferryid.planning.limits import Limits
 from ferryid.planning.segments import segments
 from ferryid.planning.waters import Waters
+from ferryid.signals.complementary_filter import MEAN_S
 from ferryid.simulate import Scenario, write_log
 from ferryid.simulate.sensors import sense
 from ferryid.simulate.trial import Simulation, sail
@@ -27,6 +28,10 @@ from ferryid.types import IN_MEMORY
 from ferryid.vessel import load_profile
 from ferryid.vessel.profile import Profile
 
+SHORT_S = 0.25
+"""Moving mean of the velocities [s] that the estimate is tried with beside the usual one of `MEAN_S`."""
+FRESH = 1000
+"""Number from which on vessels are others than those that the design was looked at with; without pairs, which take longest."""
 VESSELS = ("milliampere", "milliampere-2025")
 """Bundled vessels with a hull model that can follow a path."""
 
@@ -49,6 +54,10 @@ class Found:
         Pairs of effects of usual size that a straight run leaves unresolved, as ``ferryid diagnose`` states them.
     separated, separated_by_usual
         How many of them are resolved beside that run by a trial that is planned after it, and by the usual one.
+    scaled
+        Root mean square of the errors after either trial, each over the standard deviation that the estimate states.
+    short, short_scaled
+        Errors and the same if velocities are averaged over `SHORT_S` alone.
     """
 
     vessel: str
@@ -59,10 +68,16 @@ class Found:
     pairs: int
     separated: int
     separated_by_usual: int
+    scaled: tuple[float, float]
+    short: tuple[float, float]
+    short_scaled: tuple[float, float]
 
 
 def study(number: int) -> Found:
-    """Return what came of a vessel: a bundled one with every coefficient off as the prior has it, by a seed."""
+    """Return what came of a vessel: a bundled one with every coefficient off as the prior has it, by a seed.
+
+    Pairs are those of the first vessels, below `FRESH`.
+    """
     profile = load_profile(VESSELS[number % len(VESSELS)])
     rng = np.random.default_rng(1000 + number)
     true = _off(sailing(profile), rng)
@@ -73,11 +88,15 @@ def study(number: int) -> Found:
         assert made.track is not None
         usual = _log(waters.twelve_corners(made.duration_s), profile, true, 2 * number + 1, folder / "usual.mcap")
         planned = _log(made.track.scenario, profile, true, 2 * number + 2, folder / "planned.mcap")
-        errors = [_error(log, profile, true) for log in (usual, planned)]
+        errors, scaled = zip(*(_errors(log, profile, true, MEAN_S) for log in (usual, planned)), strict=True)
+        short, short_scaled = zip(*(_errors(log, profile, true, SHORT_S) for log in (usual, planned)), strict=True)
         deviations = np.array([(one.usual / one.now, one.planned / one.now) for one in made.hull])
         medians = np.median(deviations, axis=0)
-        counts = _separated(profile, true, made.track.limits, made.duration_s, number, folder)
-    return Found(profile.name, *errors, made.ratio, float(medians[1] / medians[0]), *counts)
+        counts = (0, 0, 0)
+        if number < FRESH:
+            counts = _separated(profile, true, made.track.limits, made.duration_s, number, folder)
+    promised = float(medians[1] / medians[0])
+    return Found(profile.name, *errors, made.ratio, promised, *counts, scaled, short, short_scaled)
 
 
 def _separated(
@@ -122,10 +141,14 @@ def _seen(profile: Profile) -> Profile:
     return replace(reading(sailing(profile), mapped(profile)), hull=profile.hull)
 
 
-def _error(log: Path, profile: Profile, true: Profile) -> float:
-    measurements, _ = read_measurements(str(log), _seen(profile))
+def _errors(log: Path, profile: Profile, true: Profile, window_s: float) -> tuple[float, float]:
+    """Return the median error of the coefficients over the prior's deviations, and the rms over those that are stated."""
+    measurements, _ = read_measurements(str(log), _seen(profile), window_s=window_s)
     seen = windows(measurements, *window_lengths(profile))
     problem = estimation_problem(seen, *prior_force_model(seen.measurements, profile))
-    found = fitted_force_model(problem.plain, fit(problem, ())).hull
+    found = fitted_force_model(problem.plain, fit(problem, ()))
     free = problem.hull_spread > 0.0
-    return float(np.median(np.abs(found - hull_of(true))[free] / problem.hull_spread[free]))
+    errors = (found.hull - hull_of(true))[free] / problem.hull_spread[free]
+    slopes = problem.hull_slopes(found)[:, free]
+    stated = np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes + np.eye(int(free.sum())))))
+    return float(np.median(np.abs(errors))), float(np.sqrt(np.mean((errors / stated) ** 2)))

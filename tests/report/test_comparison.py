@@ -17,6 +17,7 @@ from ferryid.compare.comparison_result import (
     LogErrors,
     ModelPair,
     Ratio,
+    Statement,
 )
 from ferryid.compare.comparison_statements import PairedErrors, comparison_statements, format_probability
 from ferryid.regression.resampling.paired_bootstrap import PairedRatios, compare_pairs
@@ -130,6 +131,24 @@ def test_the_headline_says_who_errs_least_and_how_surely(p: float, told: str) ->
     advice = "No fitted model is shown to be better than the profile's hull: keep the hull. Least prediction error"
     assert headline.startswith(advice) == (p > 0.05)
     assert "keep the hull" not in comparison_words.headline(result(("one", "two"), p))
+
+
+def test_the_headline_says_on_which_axes_a_model_is_better_than_the_base_model() -> None:
+    found = result(("one", BASE), 0.001)
+    assert BASE not in comparison_words.headline(found)
+
+    def changed(row: Statement) -> Statement:
+        if row.what == "sway":
+            return replace(row, better=None, p=0.5, p_corrected=1.0)
+        if row.what == "yaw":
+            return replace(row, first=row.second, second=row.first, better=row.second)
+        return row
+
+    partly = replace(found, statements=tuple(map(changed, found.statements)))
+    assert comparison_words.headline(partly).startswith(
+        "one is better than the base model on surge, worse on yaw and not shown to be better or worse on sway. "
+        "Least prediction error, log: "
+    )
 
 
 def test_without_a_window_the_force_in_single_rows_is_what_counts() -> None:

@@ -24,6 +24,7 @@ from ferryid.diagnose.judging.credibility import HullChange as Moved
 from ferryid.diagnose.judging.diagnosis import Diagnosis, Withheld
 from ferryid.diagnose.judging.error_profiles import profile_of
 from ferryid.diagnose.judging.finding import Finding, LawTerm, Rival
+from ferryid.diagnose.judging.least_sizes import LeastSize
 from ferryid.diagnose.judging.locate import Location
 from ferryid.diagnose.judging.verdict import VERDICTS
 from ferryid.effects import effects
@@ -33,7 +34,7 @@ from ferryid.files import dump_json
 from ferryid.report.diagnosis_errors import force_rows, free_run_rows, ratio_of
 from ferryid.report.diagnosis_figures import _profile, binned, in_regime
 from ferryid.report.diagnosis_page import as_text, render
-from ferryid.report.diagnosis_report import patient, report
+from ferryid.report.diagnosis_report import as_json, patient, report
 from ferryid.report.diagnosis_words import (
     about_errors,
     changed,
@@ -248,6 +249,29 @@ def test_a_verdict_is_told_with_what_changed() -> None:
         "error on held-out data falls by 75 % in surge, 90 % in sway and 95 % in yaw."
     )
     assert headline(diagnosis("matched")).startswith("Matched: nothing")
+
+
+def test_what_no_size_would_have_shown_stands_in_the_verdict() -> None:
+    unseen = [LeastSize(name, None, None, "-", "") for name in ("wind", "current", "payload", "fouling", "fouling")]
+    seen = LeastSize("heading_bias", None, 1.0, "deg", "")
+    told = headline(replace(diagnosis("matched"), least_sizes=(*unseen, seen)))
+    assert told == (
+        "Matched as far as this log can show, which is not all: nothing is found missing from the model, but wind, current, "
+        "payload and 1 more would not have been seen at any size."
+    )
+    assert headline(replace(diagnosis("matched"), least_sizes=(seen,))).startswith("Matched: nothing")
+
+
+def test_copies_stand_once_in_the_json_of_a_campaign() -> None:
+    logs = [replace(diagnosis("matched"), log=name, copies=(("b.csv", "a.bag"),)) for name in ("a", "c")]
+    told = as_json(logs)
+    assert told["copies"] == [{"log": "b.csv", "of": "a.bag"}]
+    assert all("copies" not in one for one in told["logs"])
+    assert as_json(logs[:1])["copies"] == told["copies"]
+    assert "copies" not in as_json([diagnosis("matched")])
+    schema = json.loads(files("ferryid.schemas").joinpath("diagnosis.json").read_text(encoding="utf-8"))
+    for several in (logs, logs[:1]):
+        jsonschema.validate(json.loads(json.dumps({**as_json(several), "report": "x"})), schema)
 
 
 def test_a_finding_is_told_in_numbers() -> None:

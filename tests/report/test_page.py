@@ -19,9 +19,10 @@ from ferryid.identify.log_condition import KindOutcome, LogCondition
 from ferryid.identify.outcome import EstimatorScore, FitOutcome
 from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.settings import FitSettings
+from ferryid.models.scores import ForceScores
 from ferryid.models.store.versions import StoredModel
 from ferryid.report.fit_report import as_json, as_text
-from ferryid.report.headline import headline_of
+from ferryid.report.headline import below_zero, headline_of
 from ferryid.report.page import _held, render
 from ferryid.types import RunContext
 from ferryid.vessel import load_profile
@@ -119,7 +120,7 @@ def test_conditions_of_single_logs_stand_on_the_page_in_the_text_and_in_the_json
         conditions=(current, replace(current, log="tuesday", values=np.zeros(2))),
         condition_kinds=(
             KindOutcome(
-                "current", "current", True, "its evidence over none is 20.0 nat", (("north", 0.1, "m/s"),), 20.0
+                "current", "current", True, "its log evidence over none is 20.0 nat", (("north", 0.1, "m/s"),), 20.0
             ),
             KindOutcome("payload", "load", False, "the profile has no hull model"),
         ),
@@ -137,6 +138,36 @@ def test_conditions_of_single_logs_stand_on_the_page_in_the_text_and_in_the_json
     jsonschema.validate(plain["conditions"], schema["properties"]["conditions"])
     jsonschema.validate(plain["condition_kinds"], schema["properties"]["condition_kinds"])
     assert [one["included"] for one in plain["condition_kinds"]] == [True, False]
+
+
+def test_loads_of_single_logs_are_said_to_be_relative(result: FitOutcome, tmp_path: Path) -> None:
+    load = LogCondition(
+        "monday", "payload", "load", ("mass", "moment"), ("kg", "kg·m"), np.array([80.0, 0.0]), np.eye(2)
+    )
+    kinds = (KindOutcome("payload", "load", True, "its log evidence over none is 20.0 nat"),)
+    told = (
+        "loads are relative to the hull that all logs share, positive or negative: what was aboard in every log is in"
+    )
+    for found, shown in (
+        (replace(result, conditions=(load,), condition_kinds=kinds), True),
+        (replace(result, conditions=(replace(load, kind="current"),), condition_kinds=kinds), False),
+    ):
+        text = as_text(found, StoredModel(tmp_path / "1.json", found.model, current=False), None)
+        assert (told in text) == shown
+    assert "Loads are relative to the hull" in render(replace(result, conditions=(load,), condition_kinds=kinds))[0]
+
+
+def test_what_an_r2_below_zero_means_is_said_beside_the_verdict(result: FitOutcome, tmp_path: Path) -> None:
+    assert below_zero(result) == ""
+    odd = ForceScores.of(np.array([0.4, 4.0, 1.2]), np.array([0.2, 3.0, 1.5]), np.ones(3))
+    found = replace(result, scores=replace(result.scores, force=odd))
+    told = below_zero(found)
+    assert told.startswith(
+        "R² below 0 in sway and yaw: on the held-out data the new model errs more there than the mean"
+    )
+    assert "less than the base model in sway and no less than the base model in yaw" in told
+    assert told in as_text(found, StoredModel(tmp_path / "1.json", found.model, current=False), None)
+    assert told in html.unescape(render(found)[0])
 
 
 def test_names_of_logs_and_warnings_are_escaped(result: FitOutcome) -> None:

@@ -57,6 +57,9 @@ def test_a_figure_for_each_way_of_cutting(found: Sweep) -> None:
     assert sorted(drawings) == [f"{found.what}-blocks", f"{found.what}-logs"]
     assert all(drawing in page for drawing in drawings.values())
     assert reader.seen.count("figcaption.None") == 2
+    told = html.unescape(page)
+    assert (f"Cross-validated {found.error} over the base model's against" in told) == (len(found.windows_s) == 1)
+    assert "force error" not in told
     assert reader.seen.count("tr.chosen") == 2
     for drawing in drawings.values():
         wanted = "smoothing window of the training rows [s]" if len(found.windows_s) > 1 else "MSE over base model's"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -406,3 +407,16 @@ def test_wind_without_a_heading_is_left_out_and_said(boat: Callable[..., Profile
     given = columns(u=5.0, v=0.0, r=0.0, wind_speed=1.0, wind_from=0.0)
     assert "wind_N" not in resolve(windy, given)
     assert resolve_notes(windy, given) == ("The wind was left out: without a heading it cannot be turned to north.",)
+
+
+def test_a_signal_that_a_model_needs_is_not_told_by_a_line_that_nobody_can_go_to() -> None:
+    with pytest.raises(FerryIdError) as caught:
+        select(replace(profile(BODY), path="one"), [topic("/nav2", u="float64"), T1], "a.bag")
+    message = str(caught.value)
+    assert message.startswith(
+        "a.bag: velocity is needed by the profile boat that is stored in the model one, found no topic"
+    )
+    assert "one:" not in message
+    assert message.endswith(
+        "Fix: give a log of boat, or, where the topics of that vessel have changed, its profile with --vessel"
+    )

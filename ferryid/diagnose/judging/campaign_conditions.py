@@ -45,7 +45,7 @@ from ferryid.diagnose.judging.finding import Finding, Rival
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
 from ferryid.effects.effect import Parameter
-from ferryid.effects.wording import listed
+from ferryid.effects.wording import listed, weak_evidence
 from ferryid.types import AXES, Floats
 
 
@@ -183,7 +183,7 @@ class ConditionTest:
     def doubt(self) -> str:
         """Why it is not confirmed, as the end of a sentence; empty where it is."""
         if self.evidence < INFERENCE.prior_odds:
-            return f"its evidence over none is {self.evidence:.0f} nat only"
+            return weak_evidence(self.evidence, INFERENCE.prior_odds)
         if self.gain.low <= 0.0:
             return "held-out stretches of the logs are not surely predicted better with it"
         if not self.placebos:

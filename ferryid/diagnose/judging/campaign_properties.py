@@ -25,6 +25,7 @@ from ferryid.diagnose.judging.experiment_design import manoeuvre
 from ferryid.diagnose.judging.finding import Finding, Rival
 from ferryid.diagnose.judging.rivals import same_curve
 from ferryid.diagnose.judging.thresholds import JUDGING
+from ferryid.effects.wording import weak_evidence
 from ferryid.side_by_side import over
 from ferryid.types import AXES, Floats
 
@@ -111,7 +112,7 @@ class PropertyTest:
         held, logs = self.holding
         worst = int(np.argmin(self.improvement))
         if self.evidence < INFERENCE.prior_odds:
-            return f"its evidence over none is {self.evidence:.0f} nat only"
+            return weak_evidence(self.evidence, INFERENCE.prior_odds)
         if self.gain.low <= 0.0:
             return "held-out stretches of the logs are not surely predicted better with it"
         if held < JUDGING.campaign_share * logs:

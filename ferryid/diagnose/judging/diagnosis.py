@@ -225,7 +225,14 @@ def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
         **({"not_found": [one.to_json() for one in diagnosis.least_sizes]} if diagnosis.least_sizes else {}),
         **({"second_sources": diagnosis.sources.to_json()} if diagnosis.sources else {}),
         **({} if diagnosis.learned is None else {"learned": diagnosis.learned.to_json()}),
+        **({"copies": copies} if (copies := copies_as_json([diagnosis])) else {}),
     }
+
+
+def copies_as_json(diagnoses: Sequence[Diagnosis]) -> list[dict[str, str]]:
+    """Return the logs of a campaign that are left out since they hold the motion of another, each once."""
+    pairs = dict.fromkeys(pair for one in diagnoses for pair in one.copies)
+    return [{"log": path, "of": other} for path, other in pairs]
 
 
 def _over_time(course: MeasuredCourse) -> dict[str, Any]:

@@ -37,7 +37,7 @@ from ferryid.diagnose.judging.group_loads import LoadDifference, load_difference
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
 from ferryid.effects.effect import Parameter
-from ferryid.effects.wording import listed
+from ferryid.effects.wording import listed, weak_evidence
 from ferryid.side_by_side import over
 from ferryid.vessel.profile import Profile
 
@@ -226,7 +226,7 @@ def _doubt(one: Difference, hull_known: bool, profile: Profile) -> str:
     assert one.gain is not None
     assert one.by_group is not None
     if one.evidence < INFERENCE.prior_odds:
-        return f"its evidence over none is {one.evidence:.0f} nat only, as logs of one group scatter"
+        return f"{weak_evidence(one.evidence, INFERENCE.prior_odds)}, as logs of one group scatter"
     if one.gain.low <= 0.0:
         return "held-out stretches of the logs are not surely predicted better with it"
     for group, gain in one.by_group.items():

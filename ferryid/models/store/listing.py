@@ -11,6 +11,7 @@ from ferryid.models.model import Model
 from ferryid.models.store.history import read_history
 from ferryid.models.store.versions import StoredModel, UnreadableModel, current_problems, list_models
 from ferryid.models.stored_effect import StoredEffect
+from ferryid.models.training_conditions import fitted_conditions
 
 
 def list_versions(out: Path) -> dict[str, Any]:
@@ -59,7 +60,7 @@ def _row(stored: StoredModel | UnreadableModel) -> dict[str, Any]:
 
 def _effects_of(model: Model) -> dict[str, Any]:
     if not model.diagnosed:
-        return {}
+        return {"conditions": fitted} if (fitted := fitted_conditions(model)) else {}
     return {
         "vessel_effects": [*(["hull refitted"] if model.hull else []), *(_short(one) for one in model.vessel_effects)],
         "conditions": {known.log: [_short(one) for one in known.effects] for known in model.conditions},

@@ -93,3 +93,22 @@ def test_a_position_that_stands_still_while_the_vessel_moves_is_held() -> None:
     assert finding is not None
     assert "north, east" in finding.says
     assert "heading" not in finding.says
+
+
+def test_the_force_of_what_was_not_recorded_has_the_interval_of_velocity_and_pose() -> None:
+    ramp = np.interp(0.1 * np.arange(300), [0.0, 10.0, 15.0, 30.0], [0.0, 0.0, 1.5, 1.5])
+    true = FERRY.hull.mass_kg * 0.3
+    widths = []
+    for noise in (0.02, 0.1):
+        inside = 0
+        for seed in range(20):
+            clean = run(ramp)
+            nu = clean.nu_raw + noise * np.random.default_rng(seed).standard_normal(clean.nu_raw.shape)
+            finding = unrecorded(replace(clean, nu_raw=nu))
+            assert finding is not None
+            force = finding.parameters["force"]
+            # The steepest of many slopes is picked, so that it lies above the true one.
+            inside += force.low <= true <= force.high
+        widths.append(force.high - force.low)
+        assert inside >= 14
+    assert 0.0 < widths[0] < 0.4 * widths[1]
