@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -50,6 +51,15 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"fouling": {axis: values[axis] for axis in AXES}}
 
 
+def doubt_of_ends(ends: Mapping[str, tuple[float, float]]) -> str:
+    """Return that growth on one axis alone is no fouling, which roughens the whole hull and is felt in its friction ahead."""
+    low, high = ends["surge"]
+    if low <= 1.0 <= high:
+        return "the 95 % interval of its factor in surge, where a rough hull shows most, includes none"
+    against = [axis for axis, (a, b) in ends.items() if (b < 1.0 if low > 1.0 else a > 1.0)]
+    return f"damping in {against[0]} has changed the other way, and fouling grows all of it" if against else ""
+
+
 def regressor(force_model: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return the squared speed along the axis, with its sign."""
     k = AXES.index(axis)
@@ -66,6 +76,7 @@ EFFECT = Effect(
     scenario,
     cannot=cannot,
     vessel=True,
+    doubt_of_ends=doubt_of_ends,
     regressor=regressor,
     # Within the prior of the hull it is the hull's own.
     negligible=EFFECTS.hull_spread,
