@@ -133,7 +133,8 @@ def select_properties(made: CampaignFit, progress: Callable[[str], None]) -> tup
 
 def start_of(made: CampaignFit, candidate: Candidate) -> Start:
     """Return where a search for a property begins: of its starts, the one from which the gaps promise the most evidence."""
-    starts = (_linearised(made, candidate, share) for share in candidate.start_shares)
+    # What lies beyond the start was not tried on campaigns, whose hulls and formulas are known less well.
+    starts = (_linearised(made, candidate, share) for share in candidate.start_shares if share <= 1.0)
     return max(starts, key=lambda one: one.gain)
 
 
