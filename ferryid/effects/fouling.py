@@ -11,6 +11,7 @@ import numpy as np
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import COEFFICIENTS, ForceModel, Measurements
 from ferryid.effects.thresholds import EFFECTS
+from ferryid.effects.wording import listed
 from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
 
@@ -52,12 +53,18 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
 
 
 def doubt_of_ends(ends: Mapping[str, tuple[float, float]]) -> str:
-    """Return that growth on one axis alone is no fouling, which roughens the whole hull and is felt in its friction ahead."""
-    low, high = ends["surge"]
-    if low <= 1.0 <= high:
-        return "the 95 % interval of its factor in surge, where a rough hull shows most, includes none"
-    against = [axis for axis, (a, b) in ends.items() if (b < 1.0 if low > 1.0 else a > 1.0)]
-    return f"damping in {against[0]} has changed the other way, and fouling grows all of it" if against else ""
+    """Return that damping changed both ways: a rough hull grows all of it, in surge, which is mostly friction, first."""
+    more = [axis for axis in AXES if ends[axis][0] > 1.0]
+    less = [axis for axis in AXES if ends[axis][1] < 1.0]
+    # Of surge the likeliest value counts: what rough hulls show most must not point the other way.
+    ahead = 0.5 * sum(ends["surge"])
+    if less and not more and ahead > 1.0:
+        more = ["surge"]
+    elif more and not less and ahead < 1.0:
+        less = ["surge"]
+    if not more or not less:
+        return ""
+    return f"damping in {listed(more)} has grown and in {listed(less)} fallen, and a rough hull grows all of it"
 
 
 def regressor(force_model: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:

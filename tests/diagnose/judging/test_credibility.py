@@ -229,10 +229,11 @@ def test_what_may_as_well_be_none_is_doubted(effect: str, ends: dict[str, tuple[
     [
         ((1.2, 1.6), (0.8, 1.5), (1.1, 1.4), ""),
         ((0.4, 0.8), (0.6, 1.1), (0.5, 0.9), ""),
-        ((0.5, 1.3), (0.8, 1.5), (1.2, 1.8), "the 95 % interval of its factor in surge"),
-        ((1.0, 1.3), (1.2, 1.5), (1.2, 1.8), "the 95 % interval of its factor in surge"),
-        ((1.2, 1.6), (0.8, 1.5), (0.4, 0.8), "damping in yaw has changed the other way"),
-        ((0.4, 0.8), (1.2, 1.5), (0.5, 0.9), "damping in sway has changed the other way"),
+        ((0.9, 1.7), (1.1, 1.8), (1.1, 1.7), ""),
+        ((0.5, 1.3), (0.8, 1.5), (1.2, 1.8), "damping in yaw has grown and in surge fallen,"),
+        ((0.9, 1.3), (0.8, 1.1), (0.5, 0.9), "damping in surge has grown and in yaw fallen,"),
+        ((1.2, 1.6), (0.8, 1.5), (0.4, 0.8), "damping in surge has grown and in yaw fallen,"),
+        ((0.4, 0.8), (1.2, 1.5), (0.5, 0.9), "damping in sway has grown and in surge and yaw fallen,"),
     ],
 )
 def test_fouling_is_felt_ahead_and_grows_all_damping(
