@@ -75,7 +75,7 @@ class Candidate:
     def start_at(self, share: float) -> Floats:
         """Return parameters at a share of the way from neutral to `start`."""
         neutral = np.array([one.neutral for one in self.parameters])
-        return neutral + share * (self.start - neutral)
+        return np.asarray(neutral + share * (self.start - neutral))
 
     def act(self, force_model: ForceModel, p: Floats) -> ForceModel:
         """Return the force model with the effect in it."""
