@@ -194,6 +194,8 @@ class Effect:
     doubt
         ``doubt(values, profile)`` returns why values by name are not credible of a vessel, or may stand in for something else,
         whatever the data say, as the end of a sentence; empty where they are as they may be.
+    doubt_of_ends
+        ``doubt_of_ends(ends)`` does so by the lower and upper ends of 95 % intervals by name, where a value may be chance.
     scales
         True where it multiplies all that an actuator gives: of a vessel with one actuator and no hull model, a factor on its
         masses and damping does the same.
@@ -242,6 +244,7 @@ class Effect:
     of_sensor: bool = False
     unsteady: Callable[[ForceModel], Processes] | None = None
     doubt: Callable[[Values, Profile], str] = lambda values, profile: ""
+    doubt_of_ends: Callable[[Mapping[str, tuple[float, float]]], str] = lambda ends: ""
     scales: bool = False
     of_thrust_curve: bool = False
     of_log: tuple[str, ...] = ()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import COEFFICIENTS, ForceModel, Measurements
 from ferryid.effects.thresholds import EFFECTS
+from ferryid.effects.wording import listed
 from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
 
@@ -50,6 +52,21 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"fouling": {axis: values[axis] for axis in AXES}}
 
 
+def doubt_of_ends(ends: Mapping[str, tuple[float, float]]) -> str:
+    """Return that damping changed both ways: a rough hull grows all of it, in surge, which is mostly friction, first."""
+    more = [axis for axis in AXES if ends[axis][0] > 1.0]
+    less = [axis for axis in AXES if ends[axis][1] < 1.0]
+    # Of surge the likeliest value counts: what rough hulls show most must not point the other way.
+    ahead = 0.5 * sum(ends["surge"])
+    if less and not more and ahead > 1.0:
+        more = ["surge"]
+    elif more and not less and ahead < 1.0:
+        less = ["surge"]
+    if not more or not less:
+        return ""
+    return f"damping in {listed(more)} has grown and in {listed(less)} fallen, and a rough hull grows all of it"
+
+
 def regressor(force_model: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return the squared speed along the axis, with its sign."""
     k = AXES.index(axis)
@@ -66,6 +83,7 @@ EFFECT = Effect(
     scenario,
     cannot=cannot,
     vessel=True,
+    doubt_of_ends=doubt_of_ends,
     regressor=regressor,
     # Within the prior of the hull it is the hull's own.
     negligible=EFFECTS.hull_spread,

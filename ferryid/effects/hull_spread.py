@@ -8,7 +8,7 @@ import numpy as np
 
 from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.effects.thresholds import EFFECTS
-from ferryid.types import Floats
+from ferryid.types import Flags, Floats
 from ferryid.vessel.dimensions import BLOCK_COEFFICIENT, WATER_DENSITY, dimensions, froude_seconds
 from ferryid.vessel.profile import Profile
 
@@ -16,6 +16,19 @@ from ferryid.vessel.profile import Profile
 def hull_model_spread(profile: Profile) -> float:
     """Return the standard deviation of a hull model's coefficients as a share of each: the profile's, or the usual one."""
     return profile.hull.spread if isfinite(profile.hull.spread) else EFFECTS.hull_spread
+
+
+def left_out(hull: Floats) -> Flags:
+    """Return which coefficients (26,) a hull model leaves out: damping of higher order and lift on an axis that has none.
+
+    Every hull has them: where none of an axis is in the model, they were not measured.
+    """
+    missing = np.zeros(len(COEFFICIENTS), dtype=np.bool_)
+    for axis in ("X", "Y", "N"):
+        # X_u is of first order; X_|u|u and Y_uv are not.
+        higher = np.array([name.startswith(f"{axis}_") and len(name) > 3 for name in COEFFICIENTS])
+        missing |= higher & ~hull[higher].any()
+    return missing
 
 
 def default_hull_spread(profile: Profile, nu: Floats) -> Floats:

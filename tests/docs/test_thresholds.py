@@ -117,7 +117,8 @@ NO_DECISION = {
         diagnose.inference.campaign_course KNOTS_A_MEMORY MOST_KNOTS
         diagnose.inference.campaign_model DIFFERENCE_STEP
         diagnose.inference.campaign_estimation STARTS BEARINGS STEADY_SHARE HALVINGS SEARCHES CLEARLY_BETTER SCALE_ROUNDS
-        diagnose.inference.campaign_properties WEIGHED WORTH START_SHARES
+        diagnose.inference.campaign_properties WEIGHED WORTH
+        diagnose.inference.candidate START_SHARES
         effects.actuator_force _NODES
         effects.dead_band NODES
         diagnose.inference.change_points LEVELS

@@ -12,8 +12,8 @@ import pytest
 from ferryid.diagnose.data.measurements import read_measurements
 from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.effects import effects
-from ferryid.effects.force_model import Measurements, hull_of
-from ferryid.effects.hull_spread import default_hull_spread
+from ferryid.effects.force_model import COEFFICIENTS, Measurements, hull_of
+from ferryid.effects.hull_spread import default_hull_spread, left_out
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.simulate import parse_scenario, simulate, write_log
 from ferryid.vessel import describe, load_profile
@@ -66,3 +66,23 @@ def test_a_profile_says_how_far_off_its_hull_may_be() -> None:
     assert "standard deviation 30 % of each" in describe(of_spread(0.3))
     assert "may be off by any amount" in describe(of_spread(inf))
     assert "of each" not in describe(FERRY)
+
+
+def test_damping_that_a_hull_model_leaves_out_may_be_as_large_as_of_any_hull_of_its_size(log: Path) -> None:
+    measurements, _ = read_measurements(str(log), FERRY)
+    hull = hull_of(FERRY)
+    yaw = [k for k, name in enumerate(COEFFICIENTS) if name.startswith("N_") and len(name) > 3]
+    assert not left_out(hull).any()
+    linear = hull.copy()
+    linear[yaw] = 0.0
+    assert np.flatnonzero(left_out(linear)).tolist() == yaw
+    # One that is in the model tells that the axis was measured; masses are never left out.
+    linear[yaw[0]] = -1.0
+    assert not left_out(linear).any()
+    assert not left_out(np.zeros_like(hull))[:5].any()
+    revolt = load_profile("revolt")
+    _, spread = prior_force_model(replace(measurements, profile=revolt), revolt)
+    free = left_out(hull_of(revolt))
+    assert free.sum() > 10
+    np.testing.assert_array_equal(spread[free], default_hull_spread(revolt, measurements.nu[measurements.usable])[free])
+    np.testing.assert_allclose(spread[~free], EFFECTS.hull_spread * np.abs(hull_of(revolt))[~free])

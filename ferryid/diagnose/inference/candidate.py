@@ -14,6 +14,9 @@ from ferryid.effects.wording import titled
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
 
+START_SHARES = (3.0, 2.0, 1.0, 0.75, 0.5, 0.25)
+"""Shares of the way from neutral to its start at which an effect with the end of a range is weighed, as its slope is local."""
+
 
 @dataclass(frozen=True)
 class Candidate:
@@ -59,6 +62,20 @@ class Candidate:
     def start(self) -> Floats:
         """Parameters with which a search begins."""
         return np.array([one.neutral if one.start is None else one.start for one in self.parameters])
+
+    @property
+    def start_shares(self) -> tuple[float, ...]:
+        """Shares of the way from neutral to `start` where a search may begin: several, where a slope tells of one alone."""
+        if not self.effect.piecewise:
+            return (1.0,)
+        low, high = (np.array([getattr(one, end) for one in self.parameters]) for end in ("low", "high"))
+        starts = ((share, self.start_at(share)) for share in START_SHARES)
+        return tuple(share for share, start in starts if ((low <= start) & (start <= high)).all())
+
+    def start_at(self, share: float) -> Floats:
+        """Return parameters at a share of the way from neutral to `start`."""
+        neutral = np.array([one.neutral for one in self.parameters])
+        return np.asarray(neutral + share * (self.start - neutral))
 
     def act(self, force_model: ForceModel, p: Floats) -> ForceModel:
         """Return the force model with the effect in it."""

@@ -9,6 +9,7 @@ from math import inf, log
 import numpy as np
 
 from ferryid.diagnose.inference.estimation import (
+    MAX_ITERATIONS,
     PARAMETER_DIFFERENCE,
     Candidate,
     EstimationProblem,
@@ -63,6 +64,23 @@ def linearise(problem: EstimationProblem, made: Fit, begin: StartingPoint) -> Li
     slopes = np.column_stack([begin.by_hull, effect_slopes(problem, made)])
     inverse = np.linalg.inv(slopes.T @ slopes + np.eye(slopes.shape[1]))
     return Linearisation(force_model, problem.white(force_model), slopes, np.asarray(inverse, dtype=np.float64))
+
+
+def likeliest_start(problem: EstimationProblem, linearisation: Linearisation, candidate: Candidate) -> Floats:
+    """Return where a fit of a candidate beside others begins: of its starts, the one beside which these leave the least.
+
+    An effect that ends at a limit of its own, such as a dead band, has no slope towards limits that are far from a start.
+    """
+    starts = [candidate.start_at(share) for share in candidate.start_shares]
+    if len(starts) == 1:
+        return starts[0]
+
+    def left(start: Floats) -> float:
+        white = problem.white(candidate.act(linearisation.force_model, start))
+        pull = linearisation.slopes.T @ (white - linearisation.left)
+        return float(white @ white - pull @ linearisation.inverse @ pull)
+
+    return min(starts, key=left)
 
 
 def promising_spans(problem: EstimationProblem, linearisation: Linearisation, candidate: Candidate) -> list[Candidate]:
@@ -280,28 +298,48 @@ def refine_span(
 
 
 def refit_spans(problem: EstimationProblem, made: Fit) -> Fit:
-    """Return a fit with every span where it is likeliest: noise that is less now may show it better, and elsewhere."""
+    """Return a fit with every span where it is likeliest: noise that is less now may show it better, and elsewhere.
+
+    What has ended may have been taken for something that lasts, beside another that sets in when it ends and makes up for it:
+    so the times of the others are tried as its ends, too.
+    """
     for i, candidate in enumerate(made.candidates):
-        if not candidate.times:
+        shared = _spans_to_others(problem, made.candidates, i) if candidate.effect.onset else []
+        if not candidate.times and not shared:
             continue
         bare, begin = without(problem, made, i), starting_point(problem, made)
-        linearisation = linearise(problem, bare, starting_point(problem, bare))
-        spans = [candidate, *promising_spans(problem, linearisation, candidate)]
+        spans = [candidate]
+        if candidate.times:
+            spans += promising_spans(problem, linearise(problem, bare, starting_point(problem, bare)), candidate)
         tried = [
             fit(
                 problem,
                 replace_candidate(made.candidates, i, one),
                 made.values,
-                steps=COMPARING_ITERATIONS,
+                steps=MAX_ITERATIONS if one in shared else COMPARING_ITERATIONS,
                 begin=begin,
             )
-            for one in spans
+            for one in [*spans, *shared]
         ]
         best = max(tried, key=lambda one: one.evidence)
         step = max(FIRST_TIME_STEP_S, 0.5 * part_s(problem, candidate))
         sharp = refine_span(problem, best, i, begin, step)
         made = fit(problem, sharp.candidates, sharp.values, begin=begin)
     return made
+
+
+def _spans_to_others(problem: EstimationProblem, candidates: Sequence[Candidate], index: int) -> list[Candidate]:
+    """Return a candidate in spans that begin or end when one of the others begins or ends."""
+    own = candidates[index]
+    times = [getattr(one, end) for k, one in enumerate(candidates) if k != index for end in one.times]
+    spans = [own.moved(end, time) for time in times for end in ("onset_s", "offset_s") if end not in own.times]
+    return [
+        one
+        for one in spans
+        if one.onset_s < one.offset_s
+        and lasts_s(problem, one) >= shortest_s(problem, one)
+        and span_s(problem, one) <= longest_s(problem, one)
+    ]
 
 
 def replace_candidate(candidates: Sequence[Candidate], index: int, other: Candidate) -> list[Candidate]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ferryid.effects.force_model import COEFFICIENTS, ForceModel, Measurements, hull_of
-from ferryid.effects.hull_spread import default_hull_spread, hull_model_spread
+from ferryid.effects.hull_spread import default_hull_spread, hull_model_spread, left_out
 from ferryid.effects.measurements import hull_force_model
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.errors import FerryIdError
@@ -43,7 +43,7 @@ def prior_force_model(
     ndarray
         Standard deviations, shape (26,), in the units of the coefficients: those of `hull_model_spread` where a hull
         model is known, of `EFFECTS.hull_spread` with the intervals of a fitted model, and what a vessel of this size may have
-        at most where none is known.
+        at most where none is known, or for damping that the hull model leaves out (`left_out`).
 
     Raises
     ------
@@ -53,11 +53,10 @@ def prior_force_model(
     if model is not None:
         return _modelled(measurements, profile, model, sha256)
     bare = hull_force_model(measurements, hull_of(profile))
-    spread = (
-        hull_model_spread(profile) * np.abs(bare.hull)
-        if profile.hull.is_known
-        else default_hull_spread(profile, measurements.nu[measurements.usable])
-    )
+    largest = default_hull_spread(profile, measurements.nu[measurements.usable])
+    spread = largest
+    if profile.hull.is_known:
+        spread = np.where(left_out(bare.hull), largest, hull_model_spread(profile) * np.abs(bare.hull))
     return replace(bare, external=measurements.air_load, ambient=lambda now: now.air_load), spread
 
 

@@ -25,6 +25,7 @@ from ferryid.diagnose.inference.onset_estimation import (
     COMPARING_ITERATIONS,
     FIRST_TIME_STEP_S,
     Linearisation,
+    likeliest_start,
     linearise,
     part_s,
     promising_spans,
@@ -229,7 +230,7 @@ def _best_fit(
     hopeless = INFERENCE.hopeless_share * INFERENCE.prior_odds
 
     def scored_fit(one: Candidate, values: Floats | None = None, least: float = hopeless) -> ScoredCandidate:
-        start = (*current.values, one.start if values is None else values)
+        start = (*current.values, likeliest_start(problem, linearisation, one) if values is None else values)
         # Where the hull has strained to stand in for an effect that multiplies it, the way to both leads from the profile's.
         from_prior = one.effect.changes_hull and not one.times
         made = fit(

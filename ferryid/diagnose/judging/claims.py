@@ -51,8 +51,10 @@ class Figures:
         Of what begins and ends within the log, its size over the one that hull and formulas may be off by.
     power_in_velocities
         Share of a disturbance's power that the velocities show, about its peak.
-    gain_in_velocities
-        Evidence for a disturbance in the velocities alone [nat].
+    gain, gain_in_velocities
+        Evidence for a disturbance, and in the velocities alone [nat].
+    explained_by
+        Id of another effect that the log shows, beside which nothing is left of a disturbance; empty where there is none.
     seen_twice
         True where pose and velocity of the axis on which a disturbance is strongest come from two sensors.
     other_logs
@@ -77,7 +79,9 @@ class Figures:
     single_visit: bool = False
     passes: float = inf
     power_in_velocities: float = inf
+    gain: float = inf
     gain_in_velocities: float = inf
+    explained_by: str = ""
     seen_twice: bool = True
     other_logs: OtherLogs | None = None
     beyond_feedback: bool = False

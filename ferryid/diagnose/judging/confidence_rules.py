@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from math import inf
 
 from ferryid.counts import counted
 from ferryid.diagnose.inference.feedback import OUT_OF_STEP
@@ -129,9 +130,12 @@ def law_of_one_log(finding: Finding, context: Context, _threshold: float) -> Out
 def absent_in_velocities(finding: Finding, context: Context, threshold: float) -> Outcome:
     """Lower a disturbance of whose power the velocities show less, or none: errors of positions look like a force, too.
 
-    They show it by as much evidence as any effect needs.
+    They show it by as much evidence as any effect needs. Where that is more than the positions' own, a navigation that smooths
+    may hide its power.
     """
-    if context.own.power_in_velocities >= threshold and context.own.gain_in_velocities > INFERENCE.prior_odds:
+    own = context.own
+    powerful = own.power_in_velocities >= threshold or own.gain < own.gain_in_velocities < inf
+    if powerful and own.gain_in_velocities > INFERENCE.prior_odds:
         return finding, ""
     says = f"{finding.says} The velocities do not show it: it may be an error of the positions."
     return lowered(replace(finding, says=says)), ""
@@ -146,6 +150,17 @@ def seen_by_one_sensor(finding: Finding, context: Context, _threshold: float) ->
         finding,
         "pose and velocity come from one sensor on the axis on which it is strongest, whose errors look the same",
     )
+
+
+@rule()
+def nothing_beside_another(finding: Finding, context: Context, _threshold: float) -> Outcome:
+    """Lower a disturbance of which nothing is left beside another effect that the log shows, too small for a name."""
+    other = context.own.explained_by
+    if not other:
+        return finding, ""
+    title = effects()[other].title.lower()
+    why = f"beside a {title} that is too small or too doubtful for a name, nothing is left of it"
+    return lowered(finding, other), _because(finding, why)[1]
 
 
 @rule(JUDGING.claimed_share, "of a finding's improvement")
@@ -438,6 +453,7 @@ RULES: tuple[ConfidenceRule, ...] = (
     law_of_one_log,
     absent_in_velocities,
     seen_by_one_sensor,
+    nothing_beside_another,
     not_credible,
     beside_incredible_hull,
     improves_no_claimed_axis,

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted_force_model
+from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fit, fitted_force_model
 from ferryid.diagnose.inference.force_errors import force_errors
 from ferryid.diagnose.inference.spectra import fine_windows, spectrum_of
-from ferryid.diagnose.inference.stochastic_disturbance import DisturbanceState
+from ferryid.diagnose.inference.stages import SelectedLog
+from ferryid.diagnose.inference.stochastic_disturbance import DisturbanceState, fit_disturbances
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.claims import Claim, Figures
@@ -24,8 +25,37 @@ from ferryid.effects.force_model import Measurements
 from ferryid.types import AXES, Floats
 
 
+def explained_by(log: SelectedLog, made: Fit, state: DisturbanceState) -> str:
+    """Return the id of the likeliest other effect, where nothing is left of a disturbance beside it; empty where something is.
+
+    Such an effect is not among the findings, as it is too small to matter or a placebo does as well: a delay of a fiftieth of a
+    second leaves errors that come and go with the motion, as gusts do.
+
+    Parameters
+    ----------
+    log
+        With its disturbances.
+    made
+        What else was found.
+    state
+        One of the disturbances.
+    """
+    problem, taken = log.estimated.problem, made.keys
+    likely = [one for one in log.search.rounds[-1].ranked if one.gain > INFERENCE.prior_odds]
+    for one in [one for one in likely if one.candidate.key not in taken][:1]:
+        both = fit(problem, (*made.candidates, one.candidate), (*made.values, one.fit.values[-1]))
+        _, left = fit_disturbances(problem, both, [state.candidate], problem.plain, initial=[state])
+        if not left:
+            return one.candidate.effect.id
+    return ""
+
+
 def disturbance_claims(
-    problem: EstimationProblem, made: Fit, states: Sequence[DisturbanceState], measurements: Measurements
+    problem: EstimationProblem,
+    made: Fit,
+    states: Sequence[DisturbanceState],
+    measurements: Measurements,
+    explained: Sequence[str] = (),
 ) -> list[Claim]:
     """Return disturbances as findings; each pushes all along, on the axes on which it is strong against what is left over.
 
@@ -39,13 +69,16 @@ def disturbance_claims(
         The disturbances.
     measurements
         The log's measurements at its full rate.
+    explained
+        By what each is explained as well (`explained_by`); by nothing where empty.
     """
     short = fine_windows(problem, measurements)
     errors = force_errors(short, fitted_force_model(problem.plain, made), problem.plain)
     claims = []
-    for state in states:
+    for state, other in zip(states, explained or [""] * len(states), strict=True):
         acts = _while_acting(short, state)
-        claims.append(_claim(problem, state, acts, *spectrum_of(acts, errors)))
+        claim = _claim(problem, state, acts, *spectrum_of(acts, errors))
+        claims.append(replace(claim, figures=replace(claim.figures, explained_by=other)))
     return claims
 
 
@@ -132,6 +165,7 @@ def _claim(
         Figures(
             "disturbance",
             power_in_velocities=power_in_velocities,
+            gain=state.gain,
             gain_in_velocities=state.gain_in_velocities,
             seen_twice=measurements.seen_twice(int(np.argmax(power))),
             cycles=_cycles(state, pushes),

@@ -122,9 +122,9 @@ def _force_claim(
         ),
     )
     figures = _figures(problem, candidate, values, reported, proof, removed)
-    figures = replace(
-        figures, doubt=figures.doubt or interval_doubt(candidate.parameters, estimates, kept.covariance(i))
-    )
+    ends = {name: (one.low, one.high) for name, one in estimates.items()}
+    doubt = figures.doubt or candidate.effect.doubt_of_ends(ends)
+    figures = replace(figures, doubt=doubt or interval_doubt(candidate.parameters, estimates, kept.covariance(i)))
     if proof is not None and candidate.effect.id in OUT_OF_STEP:
         beyond = proof.improvement.score_low > feedback_of(problem, kept).high
         figures = replace(figures, beyond_feedback=beyond)

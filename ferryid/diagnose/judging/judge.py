@@ -13,7 +13,7 @@ from ferryid.diagnose.judging.backward_elimination import Elimination, eliminate
 from ferryid.diagnose.judging.campaign_laws import CampaignLaws, find_campaign_laws
 from ferryid.diagnose.judging.claims import Claim, Figures, LogFigures
 from ferryid.diagnose.judging.credibility import refitted_hull, value_doubt
-from ferryid.diagnose.judging.disturbance_findings import disturbance_claims
+from ferryid.diagnose.judging.disturbance_findings import disturbance_claims, explained_by
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.findings import force_claims
 from ferryid.diagnose.judging.signal_to_noise import velocity_noise_shares
@@ -73,11 +73,12 @@ def _judged(
     base = fit(problem, ())
     progress("looking for unexplained forces")
     unknown = find_unexplained(problem, stands.fit, measurements, laws)
+    explained = over(lambda state: explained_by(log, stands.fit, state), states)
     progress("locating")
     claims = (
         *sensor_claims(log.estimated.averaged.screened),
         *force_claims(problem, stands, measurements, hull_known=log.estimated.baseline.hull_known),
-        *disturbance_claims(problem, stands.fit, states, measurements),
+        *disturbance_claims(problem, stands.fit, states, measurements, explained),
         *unknown.claims,
     )
     baseline = log.estimated.baseline

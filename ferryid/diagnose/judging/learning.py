@@ -159,6 +159,10 @@ class Learner:
 
     def _with_hints(self, wider: Model, model: Model | None, learned: Learned) -> tuple[Model | None, Learned]:
         """Return a model with effects that are hints where it predicts better than the one without them, else that one."""
+        hints = [titled(effects()[one.effect].title, one.instance) for one in _effects(wider) if not one.confirmed]
+        if not hints:
+            # Coefficients of the hull are no effect that a model lists.
+            return model, learned
         start = self.start or blank_model(self.profile, wider.name)
         # A hull that was refitted to all rows has seen those that decide here.
         unseen = replace(wider, hull=start.hull)
@@ -178,7 +182,6 @@ class Learner:
             stored, _ = self._on_top(wider, wider)
         else:
             stored = replace(found.model, accepted=True, scores=_scores(base, after, found.outcome))
-        hints = [titled(effects()[one.effect].title, one.instance) for one in _effects(wider) if not one.confirmed]
         says = (
             f"{listed(hints)} {'is a hint' if len(hints) == 1 else 'are hints'} and part of the model all the same, which "
             f"predicts better so; held-out squared prediction error against the model without: {_changes(by_axis(change))}."

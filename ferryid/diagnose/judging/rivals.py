@@ -11,13 +11,19 @@ from ferryid.diagnose.inference.estimation import (
     Candidate,
     EstimationProblem,
     Fit,
-    StartingPoint,
     choose_parameters,
     fit,
     starting_point,
     without,
 )
-from ferryid.diagnose.inference.onset_estimation import is_brief, linearise, passes, stands_out
+from ferryid.diagnose.inference.onset_estimation import (
+    Linearisation,
+    is_brief,
+    likeliest_start,
+    linearise,
+    passes,
+    stands_out,
+)
 from ferryid.diagnose.inference.search import COARSE_ITERATIONS
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.thresholds import JUDGING
@@ -97,6 +103,7 @@ def compare_rivals(problem: EstimationProblem, kept: Fit, index: int, library: S
     if is_brief(problem, candidate):
         return RivalComparison((), 1.0 / (1.0 + none), kept.evidence - bare.evidence)
     begin = starting_point(problem, bare)
+    beside = linearise(problem, bare, begin)
     taken = {one.key for one in kept.candidates}
 
     def instead(other: Candidate) -> RivalFit:
@@ -104,7 +111,7 @@ def compare_rivals(problem: EstimationProblem, kept: Fit, index: int, library: S
             replace(other, onset_s=candidate.onset_s, offset_s=candidate.offset_s) if other.effect.onset else other
         )
         stand_in = choose_parameters(problem, bare, refit_spans)
-        start = [*bare.values, stand_in.start]
+        start = [*bare.values, likeliest_start(problem, beside, stand_in)]
         made = fit(
             problem,
             [*bare.candidates, stand_in],
@@ -126,7 +133,7 @@ def compare_rivals(problem: EstimationProblem, kept: Fit, index: int, library: S
         return RivalFit(one.candidate, made, made.evidence - ours)
 
     others = [other for other in library if other.key not in taken]
-    others = [one for one in others if _may_stand_in(problem, bare, begin, candidate, one)]
+    others = [one for one in others if _may_stand_in(problem, beside, candidate, one)]
     rivals = over(instead, others)
     rivals.sort(key=lambda one: -one.gain)
     # How far behind the others are does not matter to the digit.
@@ -136,11 +143,9 @@ def compare_rivals(problem: EstimationProblem, kept: Fit, index: int, library: S
     return RivalComparison(tuple(rivals), 1.0 / (1.0 + against), kept.evidence - bare.evidence)
 
 
-def _may_stand_in(
-    problem: EstimationProblem, bare: Fit, begin: StartingPoint, candidate: Candidate, other: Candidate
-) -> bool:
+def _may_stand_in(problem: EstimationProblem, beside: Linearisation, candidate: Candidate, other: Candidate) -> bool:
     """Tell whether another may stand in a candidate's place: what only passes explains nothing that lasts or comes often."""
     if not other.effect.passing:
         return True
     there = replace(other, onset_s=candidate.onset_s, offset_s=candidate.offset_s)
-    return passes(problem, there) and stands_out(problem, linearise(problem, bare, begin), there)
+    return passes(problem, there) and stands_out(problem, beside, there)

@@ -184,6 +184,12 @@ class JudgingThresholds:
         "most that a placebo may imitate for that to count",
         "convention: two thirds; a wind in a towing tank, which was none, had a placebo that imitates 85 % of it",
     )
+    placebo_all_but: float = threshold(
+        0.9,
+        "of what a candidate explains",
+        "what the mirrored heading can imitate of one that begins and ends within a log from which on it is no placebo",
+        "convention: nine tenths; a mooring of three minutes, on a heading that hardly turned, was dropped",
+    )
     placebo_turn: float = threshold(
         30.0,
         "deg",

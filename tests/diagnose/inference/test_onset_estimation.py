@@ -19,6 +19,7 @@ from ferryid.diagnose.inference.onset_estimation import (
     part_s,
     promising_spans,
     refine_span,
+    refit_spans,
 )
 from ferryid.diagnose.inference.search import list_candidates, search
 from ferryid.diagnose.inference.weak_form import windows
@@ -66,6 +67,32 @@ def test_the_span_of_a_push_is_the_most_promising_one(first_s: float, last_s: fl
     # It is some ten times as strong as what else pushes, which forgets itself in 8 s.
     assert sharp.onset_s == pytest.approx(first_s, abs=2.0)
     assert sharp.offset_s == pytest.approx(last_s, abs=2.0)
+
+
+@pytest.mark.slow
+def test_what_ended_is_found_beside_another_that_made_up_for_it_from_then_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("ferryid.diagnose.inference.onset_estimation.promising_spans", lambda *_: [])
+    case = pushed(240.0, 90.0, 170.0)
+    other = replace(PUSH, effect=replace(PUSH.effect, id="other", onset=True), onset_s=170.0)
+    lasting = replace(PUSH, effect=replace(PUSH.effect, onset=True), onset_s=90.0)
+    both = fit(case, [lasting, other])
+    assert both.values[1] == pytest.approx(-both.values[0], rel=0.2)
+    ended, idle = refit_spans(case, both).candidates
+    assert (ended.onset_s, ended.offset_s) == (pytest.approx(90.0, abs=2.0), pytest.approx(170.0, abs=2.0))
+    assert idle.offset_s == inf
+
+
+@pytest.mark.slow
+def test_a_wide_dead_band_is_found_from_a_start_of_its_own(tmp_path: Path) -> None:
+    band = '[[effects]]\neffect = "dead_band"\nthruster = "thruster1"\nahead = 450\nastern = 450\n'
+    case = trial_on(sailed(tmp_path, "band", TWELVE + band, 5))
+    known = [one for one in list_candidates(case.plain.measurements)[0] if one.effect.id == "dead_band"]
+    found = search(case, lambda stage: None, known=known).fit
+    assert [one.key for one in found.candidates] == [("dead_band", "thruster1")]
+    assert found.values[0][0] == pytest.approx(450.0, rel=0.1)
+    # Starts lie within what is possible, and an effect without an end of a range has one.
+    assert known[0].start_shares == (3.0, 2.0, 1.0, 0.75, 0.5, 0.25)
+    assert PUSH.start_shares == (1.0,)
 
 
 @pytest.mark.slow

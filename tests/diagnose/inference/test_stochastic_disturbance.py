@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +17,12 @@ from ferryid.diagnose.inference.search import Search, list_candidates, search
 from ferryid.diagnose.inference.stochastic_disturbance import DisturbanceState, _is_identified
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.confidence_rules import absent_in_velocities
-from ferryid.diagnose.judging.disturbance_findings import _power_in_velocities, density, disturbance_claims
+from ferryid.diagnose.judging.disturbance_findings import (
+    _power_in_velocities,
+    density,
+    disturbance_claims,
+    explained_by,
+)
 from ferryid.effects import effects
 from ferryid.effects.effect import Process
 from ferryid.simulate import parse_scenario, simulate, write_log
@@ -130,3 +137,33 @@ def test_waves_slower_than_any_sea_are_none() -> None:
     values, widths = np.array([0.45, 60.0, 100.0, 6.0]), np.full(4, 0.1)
     assert _is_identified(waves, values, widths, 0.4)
     assert not _is_identified(waves, np.array([0.044, *values[1:]]), widths, 0.4)
+
+
+@pytest.mark.parametrize(
+    ("gain", "taken", "other"), [(60.0, "wind", "time_delay"), (7.9, "wind", ""), (60.0, "time_delay", "")]
+)
+def test_a_disturbance_is_explained_by_the_likeliest_effect_that_leaves_nothing_of_it(
+    monkeypatch: pytest.MonkeyPatch, gain: float, taken: str, other: str
+) -> None:
+    wind, delay, gusts = (Candidate.of(effects()[name], None, FERRY) for name in ("wind", "time_delay", "gusts"))
+    place = "ferryid.diagnose.judging.disturbance_findings"
+    monkeypatch.setattr(f"{place}.fit", lambda problem, candidates, values: [one.effect.id for one in candidates])
+
+    def left(
+        problem: object, both: list[str], candidates: object, plain: object, initial: list[Any]
+    ) -> tuple[Any, Any]:
+        return problem, [] if "time_delay" in both else initial
+
+    monkeypatch.setattr(f"{place}.fit_disturbances", left)
+    values = np.ones(1)
+    made: Any = SimpleNamespace(candidates=(wind,), values=(values,), keys=frozenset({(taken, None)}))
+    ranked = [
+        SimpleNamespace(candidate=one, gain=size, fit=SimpleNamespace(values=(values,)))
+        for one, size in ((delay, gain), (wind, 5.0))
+    ]
+    log: Any = SimpleNamespace(
+        estimated=SimpleNamespace(problem=SimpleNamespace(plain=None)),
+        search=SimpleNamespace(rounds=(SimpleNamespace(ranked=ranked),)),
+    )
+    state: Any = SimpleNamespace(candidate=gusts)
+    assert explained_by(log, made, state) == other

@@ -28,6 +28,7 @@ from ferryid.diagnose.judging.confidence_rules import (
     log_notes,
     noise_drowns_an_axis,
     not_of_all_logs,
+    nothing_beside_another,
     nothing_estimated,
     out_of_step_beside_disturbance,
     passes_by_little,
@@ -63,7 +64,7 @@ def on(kind: Kind, **figures: object) -> Context:
 
 def test_every_rule_has_a_name_a_line_and_its_unit() -> None:
     names = [one.name for one in RULES]
-    assert len(names) == len(set(names)) == 24
+    assert len(names) == len(set(names)) == 25
     for one in RULES:
         assert one.about.endswith((".", ":", ",")) or one.about, one.name
         assert (one.threshold is None) == (one.unit == ""), one.name
@@ -112,6 +113,24 @@ def test_a_disturbance_that_the_velocities_lack_is_a_hint() -> None:
     judged, _ = absent_in_velocities(found("waves"), on("disturbance", gain_in_velocities=odds))
     assert judged is not None
     assert not judged.sure
+
+
+def test_a_disturbance_for_which_velocities_speak_more_than_positions_is_in_both() -> None:
+    weak = nextafter(0.3, 0.0)
+    shown = on("disturbance", power_in_velocities=weak, gain=1600.0, gain_in_velocities=2400.0)
+    assert stands(absent_in_velocities, found("waves"), shown)
+    for gain, in_velocities in ((2400.0, 2400.0), (2400.0, 1600.0), (1600.0, inf)):
+        # Where velocities were not asked, their power decides.
+        unlike = on("disturbance", power_in_velocities=weak, gain=gain, gain_in_velocities=in_velocities)
+        assert not stands(absent_in_velocities, found("waves"), unlike)
+
+
+def test_a_disturbance_of_which_nothing_is_left_beside_another_effect_is_a_hint() -> None:
+    assert stands(nothing_beside_another, found("gusts"), on("disturbance"))
+    judged, note = nothing_beside_another(found("gusts"), on("disturbance", explained_by="time_delay"))
+    assert judged is not None
+    assert (judged.sure, judged.unresolved_with[-1]) == (False, "time_delay")
+    assert note.startswith("Gusts is a hint: beside a time delay that is too small")
 
 
 def test_a_disturbance_that_one_sensor_shows_is_a_hint() -> None:

@@ -224,6 +224,28 @@ def test_what_may_as_well_be_none_is_doubted(effect: str, ends: dict[str, tuple[
     assert interval_doubt(effects()[effect].parameters_of(FERRY), intervals(**ends)) == why
 
 
+@pytest.mark.parametrize(
+    ("surge", "sway", "yaw", "why"),
+    [
+        ((1.2, 1.6), (0.8, 1.5), (1.1, 1.4), ""),
+        ((0.4, 0.8), (0.6, 1.1), (0.5, 0.9), ""),
+        ((0.9, 1.7), (1.1, 1.8), (1.1, 1.7), ""),
+        ((0.5, 1.3), (0.8, 1.5), (1.2, 1.8), "damping in yaw has grown and in surge fallen,"),
+        ((0.9, 1.3), (0.8, 1.1), (0.5, 0.9), "damping in surge has grown and in yaw fallen,"),
+        ((1.2, 1.6), (0.8, 1.5), (0.4, 0.8), "damping in surge has grown and in yaw fallen,"),
+        ((0.4, 0.8), (1.2, 1.5), (0.5, 0.9), "damping in sway has grown and in surge and yaw fallen,"),
+    ],
+)
+def test_fouling_is_felt_ahead_and_grows_all_damping(
+    surge: tuple[float, float], sway: tuple[float, float], yaw: tuple[float, float], why: str
+) -> None:
+    doubt = effects()["fouling"].doubt_of_ends({"surge": surge, "sway": sway, "yaw": yaw})
+    assert doubt.startswith(why)
+    assert bool(doubt) == bool(why)
+    # Of an effect that has no such rule, intervals are judged by `interval_doubt` alone.
+    assert effects()["wind"].doubt_of_ends({"north": (-1.0, 1.0)}) == ""
+
+
 def test_a_wind_that_is_known_along_one_direction_alone_is_not_none() -> None:
     ends = intervals(north=(-1.0, 3.0), east=(-1.0, 3.0))
     wind = effects()["wind"].parameters_of(FERRY)

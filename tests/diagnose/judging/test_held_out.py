@@ -299,6 +299,26 @@ def test_in_circles_alone_the_mirrored_heading_may_gain_what_it_can_imitate() ->
         assert _matched(100.0, dict.fromkeys(late, 100.1 * share), alike)
 
 
+def test_while_the_heading_hardly_turns_a_mirrored_one_tests_nothing(
+    monkeypatch: pytest.MonkeyPatch, windy: EstimationProblem
+) -> None:
+    t = windy.windows.measurements.t
+    gust = replace(candidate("wind"), onset_s=float(t[0]) + 60.0, offset_s=float(t[0]) + 160.0)
+    found = fit(windy, [gust])
+
+    def placebos_judged(alike: float, one: Candidate) -> set[str]:
+        monkeypatch.setattr("ferryid.diagnose.judging.held_out.imitable", lambda *_: alike)
+        evidence = held_out_evidence(windy, replace(found, candidates=(one,)))
+        assert evidence is not None
+        return set(evidence.proofs[0].placebos)
+
+    assert HEADING in placebos_judged(0.9, gust)
+    assert HEADING not in placebos_judged(0.95, gust)
+    assert len(placebos_judged(0.95, gust)) == 3
+    # What lasts is judged by it whatever it can imitate.
+    assert HEADING in placebos_judged(0.95, candidate("wind"))
+
+
 def test_only_in_circles_is_what_comes_late_no_placebo(windy: EstimationProblem) -> None:
     values = np.append(WIND, np.ones(3))
     assert len(placebos(windy, candidate("wind"), values)) == 4

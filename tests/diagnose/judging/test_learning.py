@@ -15,7 +15,7 @@ import pytest
 
 from ferryid.compare.evaluation import evaluate
 from ferryid.diagnose.judging.diagnosis import Diagnosis, to_json
-from ferryid.diagnose.judging.learning import Learner, without_withheld
+from ferryid.diagnose.judging.learning import Learned, Learner, without_withheld
 from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS, UNITS, hull_of
 from ferryid.export.model_file import export_model
@@ -269,6 +269,17 @@ def test_a_hint_that_predicts_is_part_of_the_model(windy: tuple[str, Model], fol
     # Of a fit alone, which knows no wind's mean for all rows, the error is larger.
     assert learned.over_fit is not None
     assert float(np.mean(list(learned.over_fit.values()))) < 1.0
+
+
+def test_without_an_effect_that_is_a_hint_there_is_no_model_with_hints(
+    windy: tuple[str, Model], folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Coefficients of the hull that are a hint are no effect that a model lists."""
+    wider = replace(hinted(windy[0], folder, -3.0, 2.0), conditions=())
+    learner = Learner((windy[0],), FERRY, None, RunContext(folder), QUICK)
+    plain = Learned(True, "Nothing.")
+    monkeypatch.setattr(Learner, "_fitted", lambda *_: (None, plain))
+    assert learner.learn(None, "ferry", wider) == (None, plain)
 
 
 def test_a_hint_that_does_not_predict_stays_out(windy: tuple[str, Model], folder: Path) -> None:
