@@ -71,11 +71,12 @@ def general_warnings(settings: FitSettings, known: Excitation, scores: ModelScor
         warnings.append(f"Only {scores.seconds:.0f} s validate: the verdict rests on little data.")
     if settings.residual == "commanded":
         warnings.append("The correction was fitted to commanded forces; its error is judged against measured ones.")
-    for axis, share in zip(AXES, scores.force.r2_model.tolist(), strict=True):
+    for axis, share, ratio in zip(AXES, scores.force.r2_model.tolist(), scores.force.ratio.tolist(), strict=True):
         if np.isfinite(share) and share < 0.0:
+            more = " The base model, with which the verdict compares, errs more still." if ratio < 1.0 else ""
             warnings.append(
                 f"In {axis} the model explains the measured force worse than its mean does (R² {share:.2f}): hardly any force "
-                "varies there, or something else moves the vessel."
+                f"varies there, or something else moves the vessel. Do not rely on the model there.{more}"
             )
     return warnings
 

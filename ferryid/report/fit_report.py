@@ -15,7 +15,7 @@ from ferryid.identify import FitOutcome, FitSettings, fit_archive, fit_logs
 from ferryid.models import model_to_json
 from ferryid.models.store import StoredModel, assign_version, plan, save
 from ferryid.report.folder import PAGE, write_folder
-from ferryid.report.headline import below_zero, headline_of
+from ferryid.report.headline import headline_of
 from ferryid.report.interactive import write_assets
 from ferryid.report.model_text import describe_settings
 from ferryid.report.outcome import Report
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+JUDGED = "errors are those of a fit to the training rows alone, which judges the model"
+"""Of a model whose coefficients are from all rows, as the end of a sentence."""
 RELATIVE_LOADS = (
     "relative to the hull that all logs share, positive or negative: what was aboard in every log is in that hull"
 )
@@ -193,8 +195,8 @@ def as_text(result: FitOutcome, stored: StoredModel, report: Path | None) -> str
         lines.append(f"{name:<28}" + "".join(f"{_three_digits(value):>12}" for value in np.sqrt(mse).tolist()))
     lines.append(f"{'R², new':<28}" + "".join(f"{_number(value):>12}" for value in scores.r2_model.tolist()))
     if model.settings.get("estimated_from"):
-        lines.append("errors are those of a fit to the training rows alone, which judges the model")
-    lines.extend([note, ""] if (note := below_zero(result)) else [""])
+        lines.append(JUDGED)
+    lines.append("")
     for one in result.estimators:
         folds = (
             f"{_number(one.folds)} on folds of the training rows"

@@ -5,30 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ferryid.counts import counted, verb
-from ferryid.effects.wording import listed
 from ferryid.identify import FitOutcome
-from ferryid.types import AXES
 from ferryid.vessel import parse_profile
-
-
-def below_zero(result: FitOutcome) -> str:
-    """Return what an R² below zero of the new model means, in a sentence; empty where there is none."""
-    scores = result.scores.force
-    axes = [k for k in range(3) if np.isfinite(scores.r2_model[k]) and scores.r2_model[k] < 0.0]
-    if not axes:
-        return ""
-    better = [AXES[k] for k in axes if scores.ratio[k] < 1.0]
-    worse = [AXES[k] for k in axes if scores.ratio[k] >= 1.0]
-    beside = [f"less than the base model in {listed(better)}"] if better else []
-    beside += [f"no less than the base model in {listed(worse)}"] if worse else []
-    verdict = (
-        " The verdict compares with the base model, so that a model can be accepted all the same." if better else ""
-    )
-    return (
-        f"R² below 0 in {listed([AXES[k] for k in axes])}: on the held-out data the new model errs more there than the mean of "
-        f"what was measured would, {' and '.join(beside)}. Do not rely on it there: there is little motion on that axis, or "
-        f"noise outweighs it.{verdict}"
-    )
 
 
 def headline_of(result: FitOutcome) -> str:

@@ -16,7 +16,7 @@ from ferryid.models.forces import effective_mass
 from ferryid.report import figures
 from ferryid.report.fit_timeline import fit_timeline
 from ferryid.report.folder import made
-from ferryid.report.headline import below_zero, headline_of
+from ferryid.report.headline import headline_of
 from ferryid.report.html import template
 from ferryid.report.interactive import STATIC, Interactive, interactive_of
 from ferryid.report.left_out import left_out_table
@@ -121,7 +121,7 @@ def _context(result: FitOutcome, interactive: Interactive) -> dict[str, Any]:
         "warnings": result.warnings,
         "axes": AXES,
         "score_rows": _score_rows(result.scores.force),
-        "below_zero": below_zero(result),
+        "refitted": "estimated_from" in result.model.settings,
         "split_notes": result.scores.split_notes,
         "logs": [
             {"name": log.motion.log, "figures": _force_figures(log), "timeline": interactive.number(k)}

@@ -60,7 +60,7 @@ def _oracle_of_campaign(trial: Trial) -> OracleResult:
 def evaluate_transfer(trial: Trial) -> TransferResult | None:
     """Return the scores of the diagnosed model, and in one case of `RIVALS_EVERY` of the rivals, on a transfer log."""
     from ferryid.validation import rivals as learners
-    from ferryid.validation.transfer_test import transfer_test
+    from ferryid.validation.transfer_test import transfer
     from ferryid.vessel import load_profile
 
     if trial.more:
@@ -71,7 +71,7 @@ def evaluate_transfer(trial: Trial) -> TransferResult | None:
         return None
     other = generate(trial.case, trial.folder, transfer=True)
     profile, out = load_profile(trial.profile), trial.folder / "out"
-    return transfer_test(str(trial.log), str(other.log), profile, out, diagnosed=trial.model, rivals=rivals)
+    return transfer(str(trial.log), str(other.log), profile, out, diagnosed=trial.model, rivals=rivals).scores()
 
 
 def evaluate_rivals(trial: Trial) -> RivalDiagnoses | None:

@@ -45,8 +45,8 @@ class Transfer:
         What is known of each method beside its errors.
     rows
         Rows that all can predict, shape (n,): nobody gains by what it cannot.
-    length_s
-        Length of the windows that errors are averaged over [s].
+    mass, length_s
+        Mass matrix of the profile, shape (3, 3), and length of the windows that errors are averaged over [s].
     """
 
     second: Prepared
@@ -54,16 +54,17 @@ class Transfer:
     found: Mapping[str, Prediction]
     known: Mapping[str, TransferScore]
     rows: Rows
+    mass: Floats
     length_s: float
 
-    def scores(self, mass: Floats) -> TransferResult:
-        """Return the scores of all models; `mass` makes a force of an acceleration, shape (3, 3)."""
+    def scores(self) -> TransferResult:
+        """Return the scores of all models."""
         motion, rows, base = self.second.motion, self.rows, self.base
         base_run = base.free_run(rows)
 
         def in_windows(prediction: Prediction) -> Floats:
             seen = prediction.motion
-            errors = (seen.nu_dot - predicted_acceleration(prediction.force, seen)) @ mass.T
+            errors = (seen.nu_dot - predicted_acceleration(prediction.force, seen)) @ self.mass.T
             return _power(window_errors(errors, rows, motion.rate_hz, self.length_s))
 
         base_windows = in_windows(base)
@@ -77,27 +78,6 @@ class Transfer:
         )
 
 
-def transfer_test(
-    first_log: str,
-    transfer_log: str,
-    profile: Profile,
-    out: Path,
-    *,
-    diagnosed: Model | str | Path | None,
-    rivals: Mapping[str, Learner] = RIVALS,
-) -> TransferResult:
-    """Score the base model, a diagnosed one and every rival on another log of the truth that they were fitted to.
-
-    All predict the same: the force that the thrusters must have given for the measured motion, the acceleration under the
-    measured forces, and where the vessel goes in 60 s under them. The free runs of all take forces from outside as they were
-    along the measured path. In windows the error is the acceleration's times the mass in the profile, the same for all: a
-    model that takes the thrusters for half as strong and the hull for half as heavy moves alike, with half the force error.
-
-    Arguments and errors as of `transfer`.
-    """
-    return transfer(first_log, transfer_log, profile, out, diagnosed=diagnosed, rivals=rivals).scores(profile.hull.M)
-
-
 def transfer(
     first_log: str,
     transfer_log: str,
@@ -108,6 +88,11 @@ def transfer(
     rivals: Mapping[str, Learner] = RIVALS,
 ) -> Transfer:
     """Return what the base model, a diagnosed one and every rival expect of another log of the truth that they were fitted to.
+
+    All predict the same: the force that the thrusters must have given for the measured motion, the acceleration under the
+    measured forces, and where the vessel goes in 60 s under them. The free runs of all take forces from outside as they were
+    along the measured path. In windows the error is the acceleration's times the mass in the profile, the same for all: a
+    model that takes the thrusters for half as strong and the hull for half as heavy moves alike, with half the force error.
 
     Parameters
     ----------
@@ -154,7 +139,7 @@ def transfer(
             continue
         known[name] = TransferScore({}, names=learnt.names)
     rows = usable_rows(other.motion, base.tau, *(each.tau for each in found.values()))
-    return Transfer(other, base, found, known, rows, window_seconds(profile))
+    return Transfer(other, base, found, known, rows, profile.hull.M, window_seconds(profile))
 
 
 def window_errors(errors: Floats, rows: Rows, rate_hz: float, length_s: float) -> Floats:

@@ -1,10 +1,13 @@
-"""Cautions about free runs: told when useless, told when worse than before, silent otherwise."""
+"""Cautions about scores and free runs: told when useless, told when worse than before, silent otherwise."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ferryid.identify.fit_warnings import free_run_warnings
+from ferryid.identify.fit_warnings import free_run_warnings, general_warnings
+from ferryid.identify.outcome import Excitation
+from ferryid.identify.settings import FitSettings
+from ferryid.models import ForceScores, ModelScores
 from ferryid.models.prediction.free_run import FreeRun
 
 
@@ -32,3 +35,13 @@ def test_a_model_that_cannot_run_is_told() -> None:
     assert free_run_warnings(run(1.0, 0.1), run(1.0, 0.1, 0, "no mass")) == (
         "The new model cannot be run free: no mass.",
     )
+
+
+def test_an_axis_that_errs_more_than_its_mean_is_told_beside_the_base_model() -> None:
+    force = ForceScores.of(np.array([0.4, 4.0, 1.2]), np.array([0.2, 3.0, 1.5]), np.ones(3))
+    nothing = Excitation(np.ones(3), {}, 1.0, {}, np.ones(3))
+    sway, yaw = general_warnings(FitSettings(), nothing, ModelScores(force, 100, 500.0, "blocks", ()), 1)
+    assert sway.startswith("In sway the model explains the measured force worse than its mean does (R² -2.00)")
+    assert sway.endswith("The base model, with which the verdict compares, errs more still.")
+    assert yaw.startswith("In yaw")
+    assert yaw.endswith("Do not rely on the model there.")

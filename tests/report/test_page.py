@@ -19,10 +19,9 @@ from ferryid.identify.log_condition import KindOutcome, LogCondition
 from ferryid.identify.outcome import EstimatorScore, FitOutcome
 from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.settings import FitSettings
-from ferryid.models.scores import ForceScores
 from ferryid.models.store.versions import StoredModel
 from ferryid.report.fit_report import as_json, as_text
-from ferryid.report.headline import below_zero, headline_of
+from ferryid.report.headline import headline_of
 from ferryid.report.page import _held, render
 from ferryid.types import RunContext
 from ferryid.vessel import load_profile
@@ -157,17 +156,13 @@ def test_loads_of_single_logs_are_said_to_be_relative(result: FitOutcome, tmp_pa
     assert "Loads are relative to the hull" in render(replace(result, conditions=(load,), condition_kinds=kinds))[0]
 
 
-def test_what_an_r2_below_zero_means_is_said_beside_the_verdict(result: FitOutcome, tmp_path: Path) -> None:
-    assert below_zero(result) == ""
-    odd = ForceScores.of(np.array([0.4, 4.0, 1.2]), np.array([0.2, 3.0, 1.5]), np.ones(3))
-    found = replace(result, scores=replace(result.scores, force=odd))
-    told = below_zero(found)
-    assert told.startswith(
-        "R² below 0 in sway and yaw: on the held-out data the new model errs more there than the mean"
-    )
-    assert "less than the base model in sway and no less than the base model in yaw" in told
-    assert told in as_text(found, StoredModel(tmp_path / "1.json", found.model, current=False), None)
-    assert told in html.unescape(render(found)[0])
+def test_it_is_said_from_which_rows_errors_and_coefficients_are(result: FitOutcome, tmp_path: Path) -> None:
+    for settings, shown in (({"estimated_from": "all rows"}, True), ({}, False)):
+        kept = {name: value for name, value in result.model.settings.items() if name != "estimated_from"}
+        found = replace(result, model=replace(result.model, settings={**kept, **settings}))
+        text = as_text(found, StoredModel(tmp_path / "1.json", found.model, current=False), None)
+        assert ("errors are those of a fit to the training rows alone" in text) == shown
+        assert ("Errors are those of a fit to the training rows alone" in render(found)[0]) == shown
 
 
 def test_names_of_logs_and_warnings_are_escaped(result: FitOutcome) -> None:

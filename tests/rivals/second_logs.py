@@ -75,7 +75,7 @@ def try_case(case: Case, folder: Path) -> dict[str, Any]:
         "cell": case.cell,
         "concealed": [truth.effect for truth in case.truths],
         "true_starts_m": true_starts(found, case),
-        **found.scores(profile.hull.M).to_json(),
+        **found.scores().to_json(),
     }
 
 

@@ -85,12 +85,12 @@ def test_free_runs_from_true_states_are_those_of_a_log_without_noise(tmp_path: P
     first, second = generate(quiet, tmp_path), generate(quiet, tmp_path / "second", transfer=True)
     profile = load_profile(first.profile)
     found = transfer(str(first.log), str(second.log), profile, tmp_path / "out", diagnosed=None, rivals={})
-    ran = found.scores(profile.hull.M).methods[DIAGNOSED].position_m
+    ran = found.scores().methods[DIAGNOSED].position_m
     assert ran == pytest.approx(true_starts(found, quiet)[DIAGNOSED], rel=0.05, abs=0.02)
     noisy = replace(quiet, conditions={"noise": 3.0})
     worse = generate(noisy, tmp_path / "noisy", transfer=True)
     found = transfer(str(first.log), str(worse.log), profile, tmp_path / "out", diagnosed=None, rivals={})
-    error = found.scores(profile.hull.M).methods[DIAGNOSED].position_m
+    error = found.scores().methods[DIAGNOSED].position_m
     assert error is not None
     assert true_starts(found, noisy)[DIAGNOSED] == pytest.approx(ran, rel=0.3)
     assert error > 1.5 * ran  # type: ignore[operator]

@@ -23,7 +23,7 @@ from ferryid.validation.records import TransferResult
 from ferryid.validation.rivals import stepwise
 from ferryid.validation.rivals.base import base_of, prepared_log
 from ferryid.validation.rivals.learner import LearnedModel, Learner
-from ferryid.validation.transfer_test import transfer_test, transferred, window_errors
+from ferryid.validation.transfer_test import transfer, transferred, window_errors
 from ferryid.vessel import load_profile
 from ferryid.vessel.profile import Profile
 from tests.validation.two_logs import EAST_MPS, NORTH_MPS, WIND, two_logs
@@ -123,7 +123,7 @@ RIVALS = {
 def scored(logs: tuple[str, str, Path]) -> TransferResult:
     first, other, folder = logs
     model = _true(prepared_log(first, PROFILE, folder))
-    return transfer_test(first, other, PROFILE, folder, diagnosed=model, rivals=RIVALS)
+    return transfer(first, other, PROFILE, folder, diagnosed=model, rivals=RIVALS).scores()
 
 
 def test_a_rival_that_learnt_nothing_is_worth_the_base_model(scored: TransferResult) -> None:
@@ -217,20 +217,20 @@ def test_all_of_it_goes_into_json(scored: TransferResult) -> None:
 
 
 def test_a_diagnosis_that_wrote_no_model_leaves_the_base_model(logs: tuple[str, str, Path]) -> None:
-    nothing = transfer_test(*logs[:2], PROFILE, logs[2], diagnosed=None, rivals={}).methods["diagnosed"]
+    nothing = transfer(*logs[:2], PROFILE, logs[2], diagnosed=None, rivals={}).scores().methods["diagnosed"]
     assert nothing.mse == {"surge": 1.0, "sway": 1.0, "yaw": 1.0}
     assert "wrote no model" in nothing.why
 
 
 def test_the_first_log_is_no_second_one(logs: tuple[str, str, Path]) -> None:
     with pytest.raises(FerryIdError, match=r"the same log as .*Fix: give another log"):
-        transfer_test(logs[0], logs[0], PROFILE, logs[2], diagnosed=None, rivals={})
+        transfer(logs[0], logs[0], PROFILE, logs[2], diagnosed=None, rivals={})
 
 
 def test_a_model_of_another_log_is_refused(logs: tuple[str, str, Path]) -> None:
     model = replace(blank_model(PROFILE, "other"), training=({"name": "x", "sha256": "0"},))
     with pytest.raises(FerryIdError, match=r"not a model of .*Fix: give the model that the diagnosis"):
-        transfer_test(*logs[:2], PROFILE, logs[2], diagnosed=model, rivals={})
+        transfer(*logs[:2], PROFILE, logs[2], diagnosed=model, rivals={})
 
 
 def test_what_is_diagnosed_beats_base_model_and_stepwise_regression(logs: tuple[str, str, Path]) -> None:
@@ -240,7 +240,9 @@ def test_what_is_diagnosed_beats_base_model_and_stepwise_regression(logs: tuple[
         diagnose([first], PROFILE, DiagnosisSettings(), RunContext(folder)), PROFILE, None, folder
     )[0]
     assert found.model is not None
-    result = transfer_test(first, other, PROFILE, folder, diagnosed=found.model, rivals={"stepwise": stepwise.learn})
+    result = transfer(
+        first, other, PROFILE, folder, diagnosed=found.model, rivals={"stepwise": stepwise.learn}
+    ).scores()
     diagnosed, rival = result.methods["diagnosed"], result.methods["stepwise"]
     assert [one.effect for one in diagnosed.effects] == ["wind"]
     assert max(diagnosed.mse.values()) < 0.8
