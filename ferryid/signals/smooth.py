@@ -210,6 +210,30 @@ def steady_mean(values: Floats, rows: int) -> Floats:
     return np.ascontiguousarray(moving_mean(padded, rows)[half : half + len(values)])
 
 
+def steady_cubic(values: Floats, rows: int) -> Floats:
+    """Return the local cubic at every row, shape (n, c): quick motion passes it nearly whole, as a mean does not let it.
+
+    At the ends the values are carried on turned about the last one, so that no row is lost and a slope goes on.
+
+    Parameters
+    ----------
+    values
+        Without NaN, shape (n, c).
+    rows
+        Odd number of samples in a window; below 5 a cubic passes through all of them, and nothing is changed.
+
+    References
+    ----------
+    Savitzky and Golay (1964), Smoothing and differentiation of data by simplified least squares procedures.
+    """
+    half = min(rows // 2, len(values) - 1)
+    if 2 * half + 1 < _POLYNOMIAL + 2:
+        return values
+    padded = np.pad(values, ((half, half), (0, 0)), mode="reflect", reflect_type="odd")
+    weights, _ = local_polynomial(2 * half + 1, _POLYNOMIAL)
+    return np.ascontiguousarray(correlate(padded, weights)[half : half + len(values)])
+
+
 def moving_mean(values: Floats, rows: int) -> Floats:
     """Return the centred moving average, shape (n, c); NaN where the window leaves the data or meets a NaN.
 

@@ -88,8 +88,8 @@ NO_DECISION = {
         signals.align RATE_LIMIT_HZ
         signals.kalman _LONGEST_S
         signals.smooth _POLYNOMIAL
-        signals.complementary_filter MEAN_S SLOW_S
-        diagnose.data.measurements STRIDES
+        signals.complementary_filter CUBIC_S SLOW_S
+        diagnose.data.measurements MEAN_S STRIDES
         regression.test_function STRIDES
         diagnose.data.path_comparison RATE_HZ
         diagnose.checks.spans LENGTH_S STRIDE_S RATE_HZ

@@ -20,7 +20,6 @@ from ferryid.planning.information import information
 from ferryid.planning.limits import Limits
 from ferryid.planning.segments import segments
 from ferryid.planning.waters import Waters
-from ferryid.signals.complementary_filter import MEAN_S
 from ferryid.simulate import Scenario, write_log
 from ferryid.simulate.sensors import sense
 from ferryid.simulate.trial import Simulation, sail
@@ -28,8 +27,6 @@ from ferryid.types import IN_MEMORY
 from ferryid.vessel import load_profile
 from ferryid.vessel.profile import Profile
 
-SHORT_S = 0.25
-"""Moving mean of the velocities [s] that the estimate is tried with beside the usual one of `MEAN_S`."""
 FRESH = 1000
 """Number from which on vessels are others than those that the design was looked at with; without pairs, which take longest."""
 VESSELS = ("milliampere", "milliampere-2025")
@@ -56,8 +53,6 @@ class Found:
         How many of them are resolved beside that run by a trial that is planned after it, and by the usual one.
     scaled
         Root mean square of the errors after either trial, each over the standard deviation that the estimate states.
-    short, short_scaled
-        Errors and the same if velocities are averaged over `SHORT_S` alone.
     """
 
     vessel: str
@@ -69,8 +64,6 @@ class Found:
     separated: int
     separated_by_usual: int
     scaled: tuple[float, float]
-    short: tuple[float, float]
-    short_scaled: tuple[float, float]
 
 
 def study(number: int) -> Found:
@@ -88,15 +81,14 @@ def study(number: int) -> Found:
         assert made.track is not None
         usual = _log(waters.twelve_corners(made.duration_s), profile, true, 2 * number + 1, folder / "usual.mcap")
         planned = _log(made.track.scenario, profile, true, 2 * number + 2, folder / "planned.mcap")
-        errors, scaled = zip(*(_errors(log, profile, true, MEAN_S) for log in (usual, planned)), strict=True)
-        short, short_scaled = zip(*(_errors(log, profile, true, SHORT_S) for log in (usual, planned)), strict=True)
+        errors, scaled = zip(*(_errors(log, profile, true) for log in (usual, planned)), strict=True)
         deviations = np.array([(one.usual / one.now, one.planned / one.now) for one in made.hull])
         medians = np.median(deviations, axis=0)
         counts = (0, 0, 0)
         if number < FRESH:
             counts = _separated(profile, true, made.track.limits, made.duration_s, number, folder)
     promised = float(medians[1] / medians[0])
-    return Found(profile.name, *errors, made.ratio, promised, *counts, scaled, short, short_scaled)
+    return Found(profile.name, *errors, made.ratio, promised, *counts, scaled)
 
 
 def _separated(
@@ -141,9 +133,9 @@ def _seen(profile: Profile) -> Profile:
     return replace(reading(sailing(profile), mapped(profile)), hull=profile.hull)
 
 
-def _errors(log: Path, profile: Profile, true: Profile, window_s: float) -> tuple[float, float]:
+def _errors(log: Path, profile: Profile, true: Profile) -> tuple[float, float]:
     """Return the median error of the coefficients over the prior's deviations, and the rms over those that are stated."""
-    measurements, _ = read_measurements(str(log), _seen(profile), window_s=window_s)
+    measurements, _ = read_measurements(str(log), _seen(profile))
     seen = windows(measurements, *window_lengths(profile))
     problem = estimation_problem(seen, *prior_force_model(seen.measurements, profile))
     found = fitted_force_model(problem.plain, fit(problem, ()))

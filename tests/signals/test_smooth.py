@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy import linalg, signal
 
 from ferryid.errors import FerryIdError
+from ferryid.signals.complementary_filter import CUBIC_S
 from ferryid.signals.kalman import WINDOW_PER_TIME, fit_levels, smooth_run, steady_state
 from ferryid.signals.smooth import (
     central_difference,
@@ -21,6 +22,8 @@ from ferryid.signals.smooth import (
     moving_mean,
     odd_rows,
     smooth_measured,
+    steady_cubic,
+    steady_mean,
 )
 from ferryid.signals.track import Motion, Track
 from ferryid.vessel import load_profile
@@ -135,6 +138,32 @@ def test_correlation_is_scipys_filter() -> None:
     np.testing.assert_allclose(ours[5:-5], signal.savgol_filter(values, 11, 3, axis=0)[5:-5], atol=1e-13)
     assert np.isnan(ours[:5]).all()
     assert np.isnan(ours[-5:]).all()
+
+
+def test_the_steady_cubic_keeps_quick_motion_that_a_mean_of_the_same_noise_takes() -> None:
+    rows, mean_rows = odd_rows(CUBIC_S, RATE), odd_rows(1.0, RATE)
+    noise = np.random.default_rng(4).normal(size=(20_000, 1))
+    assert np.std(steady_cubic(noise, rows)) == pytest.approx(np.std(steady_mean(noise, mean_rows)), rel=0.05)
+    wave = np.sin(2.0 * np.pi * 0.2 * np.arange(2400) / RATE)[:, None]
+    inner = slice(200, -200)
+    cubic, mean = (
+        float(np.std(one[inner]) / np.std(wave[inner]))
+        for one in (steady_cubic(wave, rows), steady_mean(wave, mean_rows))
+    )
+    # By hand: sinc(f T) of the mean, 1 - (pi f T)^4 / 280 + ... of the cubic.
+    assert mean == pytest.approx(np.sinc(0.2), abs=0.01)
+    assert cubic == pytest.approx(1.0 - (np.pi * 0.2 * CUBIC_S) ** 4 / 280.0, abs=0.003)
+
+
+def test_the_steady_cubic_keeps_cubics_and_loses_no_row() -> None:
+    t = np.linspace(-1.0, 1.0, 301)
+    values = np.column_stack([t**3 - t, 2.0 * t + 3.0])
+    smooth = steady_cubic(values, 41)
+    np.testing.assert_allclose(smooth[20:-20], values[20:-20], atol=1e-12)
+    # A line goes on beyond both ends.
+    np.testing.assert_allclose(smooth[:, 1], values[:, 1], atol=1e-12)
+    np.testing.assert_array_equal(steady_cubic(values[:2], 41), values[:2])
+    np.testing.assert_array_equal(steady_cubic(values, 3), values)
 
 
 @pytest.mark.parametrize("smoother", SMOOTHERS)

@@ -22,9 +22,9 @@ from ferryid.diagnose.checks.pooling import Examined, find_in_turn, pool_check
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
 from ferryid.errors import FerryIdError
-from ferryid.signals.complementary_filter import MEAN_S, complementary_filter
+from ferryid.signals.complementary_filter import CUBIC_S, complementary_filter
 from ferryid.signals.mirror import mirrored
-from ferryid.signals.smooth import odd_rows, steady_mean
+from ferryid.signals.smooth import odd_rows, steady_cubic
 
 SPOILS = frozenset({"held_samples", "heading_wrap", "clock_offset", "heading_bias", "velocity_scale", "yaw_rate_scale"})
 """Errors that spoil the velocity in products, which is made of position, heading and velocity.
@@ -126,6 +126,6 @@ def refilter_velocity(measurements: Measurements) -> Measurements:
     return replace(
         measurements,
         nu=complementary_filter(
-            steady_mean(measurements.nu_raw, odd_rows(MEAN_S, rate)), measurements.nu_raw, eta, rate
+            steady_cubic(measurements.nu_raw, odd_rows(CUBIC_S, rate)), measurements.nu_raw, eta, rate
         ),
     )

@@ -15,14 +15,14 @@ from ferryid.effects.measurements import actuator_forces, interpolate_gaps, rudd
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.models import validity_ranges
 from ferryid.signals.align import align
-from ferryid.signals.complementary_filter import MEAN_S, complementary_filter
+from ferryid.signals.complementary_filter import CUBIC_S, complementary_filter
 from ferryid.signals.consistency import comparable
 from ferryid.signals.data_quality import left_out_sentences, repair_sentences
 from ferryid.signals.faults import find_faults
 from ferryid.signals.prepare import doubts_of
 from ferryid.signals.recording import Recording, record
 from ferryid.signals.sampling import check_sampling
-from ferryid.signals.smooth import Measured, measure, odd_rows, smooth_measured, steady_mean
+from ferryid.signals.smooth import Measured, measure, odd_rows, smooth_measured, steady_cubic
 from ferryid.signals.source import Held
 from ferryid.signals.stream import compact
 from ferryid.signals.track import LeftOut, Motion, Track
@@ -37,6 +37,8 @@ WITHHELD = {
     "payload": ("payload_kg", "payload_x"),
 }
 """What may be kept from the diagnosis, to be compared with what it finds, and the columns of it."""
+MEAN_S = 1.0
+"""Moving mean of the motion whose ranges a model tells, as for a fit [s]."""
 STRIDES = 4
 CHANNELS = {"x": (0, 1), "y": (0, 1), "psi": (2,), "u": (3,), "v": (4,), "r": (5,), "vel_N": (3, 4), "vel_E": (3, 4)}
 """Places of a signal among north, east, heading, surge, sway and yaw rate; a position is one sample."""
@@ -145,11 +147,11 @@ def read_measurements(
     run: RunContext = IN_MEMORY,
     *,
     withhold: Sequence[str] = (),
-    window_s: float = MEAN_S,
+    window_s: float = CUBIC_S,
 ) -> tuple[Measurements, Survey]:
     """Return the measurements that a log shows, and what else is known of the log.
 
-    Positions, heading and `nu_raw` are as measured; `nu`, wind and current pass through a moving mean, as they enter
+    Positions, heading and `nu_raw` are as measured; `nu`, wind and current pass through a local cubic, as they enter
     products. Across gaps all signals are bridged so that filters can run on, but no row there is `usable`.
 
     Parameters
@@ -163,7 +165,7 @@ def read_measurements(
     withhold
         Signals to hide, of `WITHHELD`.
     window_s
-        Moving mean [s].
+        Window of the local cubic [s]; 0 leaves all as measured.
 
     Raises
     ------
@@ -196,7 +198,7 @@ def read_measurements(
         raise FerryIdError(
             f"{recording.name}: no recording of a vessel, {why}. Fix: use recorded logs, or map measured signals in the profile"
         ) from error
-    motion = smooth_measured(measured, window_s)
+    motion = smooth_measured(measured, min(MEAN_S, window_s))
     repeats = _repeats(faults.repeats, track.t0_ns)
     measurements = replace(_measurements(track, measured, profile, window_s), repeats=repeats)
     doubts = doubts_of(recording, track)
@@ -288,12 +290,12 @@ def _measurements(track: Track, measured: Measured, profile: Profile, window_s: 
         t=measured.t,
         eta=eta,
         nu_raw=nu_raw,
-        nu=complementary_filter(steady_mean(nu_raw, rows), nu_raw, eta, track.rate_hz),
+        nu=complementary_filter(steady_cubic(nu_raw, rows), nu_raw, eta, track.rate_hz),
         parts=parts,
         angles=angles,
         usable=usable,
-        wind=None if measured.wind is None else steady_mean(interpolate_gaps(measured.wind, usable), rows),
-        current=None if current is None else steady_mean(current, rows),
+        wind=None if measured.wind is None else steady_cubic(interpolate_gaps(measured.wind, usable), rows),
+        current=None if current is None else steady_cubic(current, rows),
         payload=None if measured.payload is None else interpolate_gaps(measured.payload, usable, held=True),
         rudders=rudder_states(profile, track.columns, through_water, usable),
         slopes=track.slopes,

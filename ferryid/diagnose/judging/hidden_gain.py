@@ -20,8 +20,8 @@ from ferryid.diagnose.judging.campaign_conditions import ConditionTest
 from ferryid.diagnose.judging.campaign_evidence import Gain, held_out_loss, with_conditions
 from ferryid.effects.force_model import Measurements
 from ferryid.models import Model
-from ferryid.signals.complementary_filter import MEAN_S
-from ferryid.signals.smooth import odd_rows, steady_mean
+from ferryid.signals.complementary_filter import CUBIC_S
+from ferryid.signals.smooth import odd_rows, steady_cubic
 from ferryid.types import Floats
 
 
@@ -139,8 +139,8 @@ def _informed(test: ConditionTest, i: int, log: AveragedLog, model: Model | None
 
 
 def bridged(measurements: Measurements, hidden: Floats) -> Floats:
-    """Return a hidden flow on the rows of the measurements, gaps bridged, averaged as a measured one is, shape (n, 2)."""
+    """Return a hidden flow on the rows of the measurements, gaps bridged, smoothed as a measured one is, shape (n, 2)."""
     known = np.isfinite(hidden).all(axis=1)
     t = measurements.t
     columns = [np.interp(t, t[: len(hidden)][known], column[known]) for column in hidden.T]
-    return steady_mean(np.column_stack(columns), odd_rows(MEAN_S, 1.0 / measurements.step_s))
+    return steady_cubic(np.column_stack(columns), odd_rows(CUBIC_S, 1.0 / measurements.step_s))

@@ -273,7 +273,7 @@ class JudgingThresholds:
         2.0,
         "s",
         "time over which a slope of positions is about as noisy as the velocity in use",
-        "convention: twice the moving mean of the velocity in products",
+        "convention: about the window of the local cubic of the velocity in products",
     )
     reaction_share: float = threshold(
         0.5,
