@@ -132,7 +132,7 @@ def test_effect_is_found_where_it_acts(name: str, tmp_path: Path) -> None:
 
 def test_a_hull_model_that_is_wrong_all_over_is_named(tmp_path: Path) -> None:
     log = tmp_path / "trial.mcap"
-    write_log(simulate(parse_scenario(base(), "effect"), 1), log)
+    write_log(simulate(parse_scenario(base(), "effect"), 2), log)
     measurements, _ = read_measurements(str(log), FERRY)
     seen = windows(measurements, *window_lengths(FERRY))
     plain, spread = prior_force_model(seen.measurements, FERRY)
