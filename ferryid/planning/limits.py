@@ -24,6 +24,8 @@ LEAST_ROOM = 3.0
 """Shorter side of an area, in lengths of the vessel, below which there is no room for circles."""
 MOST_ROOM = 40.0
 """Longer side of an area, in lengths of the vessel, beyond which more room is not used."""
+CLEARANCE = 0.1
+"""Room between a path's hull and the area's sides, in lengths: a vessel wanders about its path, in no two runs alike."""
 GRAVITY = 9.81
 
 
@@ -38,7 +40,7 @@ class Limits:
     acceleration
         From rest [m/s², m/s², rad/s²].
     long, wide
-        Half of the area's sides, less half a length of the vessel [m].
+        Half of the area's sides, less half a length of the vessel and the clearance [m].
     """
 
     speed: tuple[float, float, float]
@@ -81,7 +83,7 @@ def limits_of(vessel: Profile, area: tuple[float, float]) -> Limits:
     )
     acceleration = (surge / float(M[0, 0]), sway / float(M[1, 1]), yaw / float(M[2, 2]))
     used = [min(side, MOST_ROOM * length) for side in sorted(area, reverse=True)]
-    long, wide = (0.5 * (side - length) for side in used)
+    long, wide = (0.5 * (side - length) - CLEARANCE * length for side in used)
     return Limits(speed, acceleration, long, wide)
 
 

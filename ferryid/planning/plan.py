@@ -19,7 +19,7 @@ from ferryid.ingest import open_log
 from ferryid.ingest.hashing import content_hash
 from ferryid.models import Model
 from ferryid.planning.information import deviations, information
-from ferryid.planning.limits import Limits, limits_of, within
+from ferryid.planning.limits import CLEARANCE, Limits, limits_of, within
 from ferryid.planning.segments import STEP_S, segments
 from ferryid.planning.selection import choose, separated_from
 from ferryid.planning.steering import LEAD_S, Manoeuvre, manoeuvres
@@ -291,7 +291,10 @@ def _path(waters: Waters, known: Sequence[Responses], pairs: Pairs, settings: Pl
     # The vessel overshoots what it is asked for, more with a quick manoeuvre: some leave the area.
     cuts = np.searchsorted(np.linspace(0.0, ends[-1], len(sailed)), ends)
     pieces = np.split(sailed, cuts[:-1])[1:]
-    inside = [k for k, piece in enumerate(pieces) if within(piece, area, dimensions(waters.profile)[:2])]
+    beam = dimensions(waters.profile)[1]
+    # Half of the clearance is left to what another run does otherwise.
+    room = length + CLEARANCE * length, beam + CLEARANCE * length
+    inside = [k for k, piece in enumerate(pieces) if within(piece, area, room)]
     # Where none stays within, the shortest is refused or taken as the others are.
     kept = inside or list(range(len(drawn)))
     drawn, parts = [drawn[k] for k in kept], [parts[k] for k in kept]

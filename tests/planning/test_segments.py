@@ -79,11 +79,13 @@ def test_speeds_are_those_at_which_damping_takes_the_force() -> None:
     assert plain.speed[1] == pytest.approx(sqrt(force / 800.0))
 
 
-def test_room_is_half_the_sides_less_half_a_length() -> None:
+def test_room_is_half_the_sides_less_half_a_length_and_the_clearance() -> None:
     vessel = sailing(load_profile("milliampere"))
     for area in ((60.0, 40.0), (40.0, 60.0)):
         limits = limits_of(vessel, area)
-        assert (limits.long, limits.wide) == (0.5 * (60.0 - vessel.hull.length_m), 0.5 * (40.0 - vessel.hull.length_m))
+        length = vessel.hull.length_m
+        assert limits.long == pytest.approx(30.0 - 0.5 * length - CLEARANCE * length)
+        assert limits.wide == pytest.approx(20.0 - 0.5 * length - CLEARANCE * length)
     with pytest.raises(
         FerryIdError, match=r"--area: 10x40 m has no room for the turning circle .* Fix: give at least 15x15"
     ):
