@@ -10,7 +10,7 @@ import pytest
 
 from ferryid.errors import FerryIdError
 from ferryid.identifiability.trial import sailing
-from ferryid.planning.limits import USED, Limits, limits_of
+from ferryid.planning.limits import CLEARANCE, USED, Limits, limits_of
 from ferryid.planning.segments import PEAK, STEP_S, segments
 from ferryid.simulate.plant.thrust import curves_of, largest_force
 from ferryid.vessel import load_profile
