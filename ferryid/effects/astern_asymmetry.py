@@ -76,4 +76,5 @@ EFFECT = Effect(
     regressor=regressor,
     formula_error=EFFECTS.definition_error,
     simulated=Simulated(thrust=thrust),
+    by_row=True,
 )

@@ -69,4 +69,5 @@ EFFECT = Effect(
     vessel=True,
     regressor=regressor,
     formula_error=EFFECTS.definition_error,
+    by_row=True,
 )

@@ -66,4 +66,5 @@ EFFECT = Effect(
     absent_in=("tank",),
     rare_in=("pond",),
     common_in=("sea",),
+    by_row=True,
 )

@@ -169,4 +169,5 @@ EFFECT = Effect(
     regressor=regressor,
     formula_error=EFFECTS.load_error,
     simulated=Simulated(thrust=thrust),
+    by_row=True,
 )

@@ -186,6 +186,9 @@ class Effect:
     profiled
         Parameter that others trade with, along which the posterior of an effect that acts all along is followed; empty where
         its curvature tells all.
+    by_row
+        True where what it does to a row depends on that row and the parameters alone, so that logs one after another are one.
+        Where ``of_log`` names parameters, it takes them for each row as well, shape (n, p).
     of_sensor
         True where it corrects what was measured: such effects act first, as the others act on what is true.
     unsteady
@@ -241,6 +244,7 @@ class Effect:
     of_coefficients: bool = False
     piecewise: bool = False
     profiled: str = ""
+    by_row: bool = False
     of_sensor: bool = False
     unsteady: Callable[[ForceModel], Processes] | None = None
     doubt: Callable[[Values, Profile], str] = lambda values, profile: ""

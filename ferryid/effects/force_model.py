@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ferryid.counts import counted
 from ferryid.effects.equations_of_motion import accelerations, from_antenna, required, slopes
-from ferryid.effects.wind_loads import steady_wind_force
+from ferryid.effects.wind_loads import shape_of, steady_wind_force, weighed_loads_by_row
 from ferryid.types import Floats, Ints
 from ferryid.vessel.hull import payload_mass
 from ferryid.vessel.profile import Profile
@@ -116,7 +116,7 @@ class Measurements:
         return np.cos(self.psi), np.sin(self.psi)
 
     @cached_property
-    def wind_loads(self) -> dict[tuple[float, ...], Floats]:
+    def wind_loads(self) -> dict[tuple[bytes, float], Floats]:
         """Loads that were worked out already, by what tells them apart; see `ferryid.effects.wind.mean_load`."""
         return {}
 
@@ -150,8 +150,8 @@ class ForceModel:
     damping_factor
         Factor on all damping, shape (n,), or None.
     air
-        Where an air flow goes to that is imagined and not measured, north and east [m/s], shape (2,), or None; its load is
-        among the external forces.
+        Where an air flow goes to that is imagined and not measured, north and east [m/s], shape (2,), or (n, 2) where every
+        row has its own, or None; its load is among the external forces.
     air_factors
         Those on the load that the profile tells of it, surge, sway and yaw, shape (3,), or None for one each.
     gust_std
@@ -323,6 +323,27 @@ def wind_load(measurements: Measurements, air: Floats, weights: Floats = _ONE_WI
     assert areas is not None
     winds = np.ascontiguousarray(np.atleast_2d(air), dtype=np.float64)
     return steady_wind_force(areas, winds, weights, *measurements.pointing, np.ascontiguousarray(measurements.nu))
+
+
+def wind_load_by_row(measurements: Measurements, air: Floats, away: Floats, weights: Floats) -> Floats:
+    """Return the load of a wind that every row has of its own [N, N, N·m], shape (n, 3).
+
+    Parameters
+    ----------
+    measurements
+        Of a vessel with wind areas.
+    air
+        Where it goes to, north and east [m/s], shape (n, 2).
+    away, weights
+        Winds about it, shape (w, 2), whose loads are summed with these weights, shape (w,).
+    """
+    areas = measurements.profile.wind
+    assert areas is not None
+    winds, nu = np.ascontiguousarray(air, dtype=np.float64), np.ascontiguousarray(measurements.nu)
+    # Compiled code does not look where an array ends.
+    if len(winds) != len(nu):
+        raise ValueError(f"{counted(len(nu), 'row')} with {counted(len(winds), 'wind')}")
+    return weighed_loads_by_row(winds, away, weights, *measurements.pointing, nu, shape_of(areas))
 
 
 def between(

@@ -88,4 +88,5 @@ EFFECT = Effect(
     # Within the prior of the hull it is the hull's own.
     negligible=EFFECTS.hull_spread,
     changes_hull=True,
+    by_row=True,
 )

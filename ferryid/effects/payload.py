@@ -117,4 +117,5 @@ EFFECT = Effect(
     changes_hull=True,
     profiled="mass",
     doubt=doubt,
+    by_row=True,
 )

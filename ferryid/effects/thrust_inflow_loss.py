@@ -74,4 +74,5 @@ EFFECT = Effect(
     vessel=True,
     regressor=regressor,
     negligible=EFFECTS.least_inflow,
+    by_row=True,
 )

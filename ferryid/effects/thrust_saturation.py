@@ -133,4 +133,5 @@ EFFECT = Effect(
     regressor=regressor,
     formula_error=EFFECTS.definition_error,
     simulated=Simulated(thrust=thrust),
+    by_row=True,
 )

@@ -77,4 +77,5 @@ EFFECT = Effect(
     regressor=regressor,
     formula_error=EFFECTS.definition_error,
     passing_size=EFFECTS.passing_gain,
+    by_row=True,
 )

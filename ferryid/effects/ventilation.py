@@ -133,4 +133,5 @@ EFFECT = Effect(
     regressor=regressor,
     negligible=EFFECTS.least_ventilation,
     simulated=Simulated(thrust=change, constants=constants),
+    by_row=True,
 )

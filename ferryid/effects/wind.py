@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects.effect import Choice, Effect, Parameter, Residual, Turbulence, Values, span
-from ferryid.effects.force_model import ForceModel, Measurements, wind_load
+from ferryid.effects.force_model import ForceModel, Measurements, wind_load, wind_load_by_row
 from ferryid.effects.hull_spread import hull_model_spread
 from ferryid.effects.linear_evidence import hull_jacobian, profiled_loss
 from ferryid.effects.thresholds import EFFECTS
@@ -30,6 +30,8 @@ against it, a wind from the other side may be likelier than none, and than all b
 
 MEAN_WEIGHTS = np.array([1.0 / 3.0, *[1.0 / 6.0] * 4])
 """Of the loads of a wind as it is on average and in the four gusts of `mean_load`."""
+MEAN_GUSTS = np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+_AS_IT_IS = np.zeros((1, 2)), np.ones(1)
 KEPT = 8
 """Loads of winds that are kept beside the measurements."""
 
@@ -64,11 +66,11 @@ def choose(force_model: ForceModel, prior_hull: Floats, residual: Residual) -> C
 
 
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
-    """Add the wind's load, less that of still air, which is there already."""
+    """Add the wind's load, less that of still air, which is there already; every row may have a wind of its own."""
     measurements = force_model.measurements
     if measurements.profile.wind is None:
         return force_model
-    air, factors = np.split(np.asarray(p, dtype=np.float64), [2])
+    air, factors = np.split(np.asarray(p, dtype=np.float64), [2], axis=-1)
     factors = factors if factors.size else np.ones(3)
     external = mean_load(measurements, air, force_model.gust_std) - measurements.air_load
     external *= factors
@@ -82,13 +84,13 @@ def unreported(measurements: Measurements, p: Floats) -> frozenset[str]:
 
 
 def mean_load(measurements: Measurements, air: Floats, gust_std: float) -> Floats:
-    """Return what a wind loads the vessel with on average [N, N, N·m], shape (n, 3).
+    """Return what a wind, shape (2,) or (n, 2), loads the vessel with on average [N, N, N·m], shape (n, 3).
 
     A load that goes with the square of the speed is larger in gusts: the mean over a normal distribution, by Gauss's and
     Hermite's rule of three points along north and east each. The loads used last are kept: most steps of a fit move other
     effects, and fits of one search begin alike.
     """
-    key = (*air.tolist(), gust_std)
+    key = (air.tobytes(), gust_std)
     loads = measurements.wind_loads
     known = loads.pop(key, None)
     if known is None:
@@ -101,10 +103,10 @@ def mean_load(measurements: Measurements, air: Floats, gust_std: float) -> Float
 
 
 def _mean_load(measurements: Measurements, air: Floats, gust_std: float) -> Floats:
-    if gust_std == 0.0:
-        return wind_load(measurements, air)
-    away = sqrt(3.0) * gust_std * np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
-    return wind_load(measurements, air + away, MEAN_WEIGHTS)
+    away, weights = _AS_IT_IS if gust_std == 0.0 else (sqrt(3.0) * gust_std * MEAN_GUSTS, MEAN_WEIGHTS)
+    if air.ndim > 1:
+        return wind_load_by_row(measurements, air, away, weights)
+    return wind_load(measurements, air + away, weights)
 
 
 def cannot(measurements: Measurements) -> str:
@@ -148,4 +150,5 @@ EFFECT = Effect(
     turbulence=Turbulence(EFFECTS.wind_turbulence, EFFECTS.least_wind_std, EFFECTS.wind_length),
     absent_in=("tank",),
     common_in=("pond", "harbour", "sea"),
+    by_row=True,
 )

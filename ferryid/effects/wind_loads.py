@@ -117,3 +117,43 @@ def weighed_loads(winds: Floats, weights: Floats, cosine: Floats, sine: Floats, 
         for i in range(rows):
             out[first + i, 0], out[first + i, 1], out[first + i, 2] = X[i], Y[i], N[i]
     return out
+
+
+@compiled
+def weighed_loads_by_row(
+    winds: Floats, away: Floats, weights: Floats, cosine: Floats, sine: Floats, nu: Floats, shape: Shape
+) -> Floats:
+    """Return the weighted sum of the loads of winds about one that every row has of its own, shape (n, 3) [N, N, N·m].
+
+    Parameters
+    ----------
+    winds
+        That of each row, shape (n, 2).
+    away, weights
+        What is added to it, shape (w, 2), and the weight of the load of each, shape (w,).
+    cosine, sine, nu
+        As of `steady_wind_force`.
+    shape
+        `shape_of` the areas.
+    """
+    n = nu.shape[0]
+    out = np.empty((n, 3))
+    u, v, X, Y, N = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK)
+    ahead, aside = np.empty(BLOCK), np.empty(BLOCK)
+    for first in range(0, n, BLOCK):
+        rows = min(BLOCK, n - first)
+        c, s = cosine[first : first + rows], sine[first : first + rows]
+        for i in range(rows):
+            u[i], v[i] = nu[first + i, 0], nu[first + i, 1]
+            ahead[i], aside[i] = winds[first + i, 0], winds[first + i, 1]
+            X[i], Y[i], N[i] = 0.0, 0.0, 0.0
+        for w in range(away.shape[0]):
+            north, east, weight = away[w, 0], away[w, 1], weights[w]
+            for i in range(rows):
+                x, y, turn = load_at(c[i], s[i], u[i], v[i], ahead[i] + north, aside[i] + east, shape)
+                X[i] += weight * x
+                Y[i] += weight * y
+                N[i] += weight * turn
+        for i in range(rows):
+            out[first + i, 0], out[first + i, 1], out[first + i, 2] = X[i], Y[i], N[i]
+    return out

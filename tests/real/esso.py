@@ -15,7 +15,8 @@ from ferryid.diagnose.data.course import MeasuredCourse
 from ferryid.diagnose.data.measurements import read_measurements, window_lengths
 from ferryid.diagnose.inference.campaign import assemble
 from ferryid.diagnose.inference.campaign_estimation import estimate_campaign
-from ferryid.diagnose.inference.campaign_model import Campaign, Member
+from ferryid.diagnose.inference.campaign_logs import Member
+from ferryid.diagnose.inference.campaign_model import Campaign
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.stages import AveragedLog
 from ferryid.diagnose.inference.weak_form import windows

@@ -10,7 +10,8 @@ import numpy as np
 
 from ferryid.counts import counted
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit
-from ferryid.diagnose.inference.campaign_model import INDUCED, Campaign, HullPrior, Member, induced, induced_spread
+from ferryid.diagnose.inference.campaign_logs import Member
+from ferryid.diagnose.inference.campaign_model import INDUCED, Campaign, HullPrior, induced, induced_spread
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.prior import correlation_root, prior_force_model
 from ferryid.diagnose.inference.stages import AveragedLog

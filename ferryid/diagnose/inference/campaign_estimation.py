@@ -148,7 +148,7 @@ class CampaignFit:
         The covariance is as much wider as logs differ by more than their noise, and as estimates are elsewhere.
         """
         campaign = self.campaign
-        rows = [j for j, (of, _) in enumerate(campaign.own) if of == k]
+        rows = _rows(campaign, k)
         parameters = [campaign.own[j][1] for j in rows]
         mean, size = self.common[campaign.means][rows], np.array([one.size for one in parameters])
         neutral = np.array([one.neutral for one in parameters])
@@ -310,7 +310,12 @@ def _elsewhere(made: CampaignFit) -> Floats | None:
     directions and lengths of each of its conditions, while what is common may move as far as the other logs let it. None where
     no log finds better.
     """
-    found = over(lambda i: _better(made, i), range(len(made.own)))
+    campaign, tried = made.campaign, list[_Tried]()
+    for k in range(len(campaign.conditions)):
+        rows = _rows(campaign, k)
+        mean = made.common[campaign.means][rows]
+        tried.append(_Tried.of(campaign, rows, made.common, made.own, [start - mean for start in _starts()]))
+    found = over(lambda i: _better(made, i, tried), range(len(made.own)))
     return (
         None
         if all(one is None for one in found)
@@ -318,7 +323,36 @@ def _elsewhere(made: CampaignFit) -> Floats | None:
     )
 
 
-def _better(made: CampaignFit, i: int) -> Floats | None:
+@dataclass(frozen=True)
+class _Tried:
+    """A condition of every log at several values: the rows of a log's own vector, the vectors, and the gaps with them.
+
+    Vectors have the shape (starts, L, l), the gaps of each log (J, 3, starts).
+    """
+
+    rows: list[int]
+    own: Floats
+    gaps: list[Floats]
+
+    @classmethod
+    def of(cls, campaign: Campaign, rows: list[int], common: Floats, own: Floats, starts: Sequence[Floats]) -> _Tried:
+        every = np.repeat(own[None], len(starts), axis=0)
+        every[:, :, rows] = np.stack(starts)[:, None]
+        gaps = zip(*(campaign.gaps(common, one) for one in every), strict=True)
+        return cls(rows, every, [np.stack(one, axis=2) for one in gaps])
+
+    def white(self, noise: CampaignNoise, i: int, runs: Runs) -> Floats:
+        """Return the whitened gaps of a log, shape (3 J, starts)."""
+        gaps = self.gaps[i]
+        return noise.white(i, gaps, runs).reshape(-1, gaps.shape[2])
+
+
+def _rows(campaign: Campaign, k: int) -> list[int]:
+    """Return which rows of a log's own vector a condition has."""
+    return [j for j, (of, _) in enumerate(campaign.own) if of == k]
+
+
+def _better(made: CampaignFit, i: int, tried: Sequence[_Tried]) -> Floats | None:
     """Return the own vector of a log with conditions that explain clearly more than its present ones; None without such."""
     campaign, part, g = made.campaign, made.parts[i], made.campaign.g
     runs = campaign.members[i].windows.runs
@@ -331,20 +365,17 @@ def _better(made: CampaignFit, i: int) -> Floats | None:
     H[g:, g:] += np.diag(own_precision)
     now = float(w @ w + made.own[i] ** 2 @ own_precision)
     best, least = None, now - 2.0 * CLEARLY_BETTER
-    for k in range(len(campaign.conditions)):
-        rows = [j for j, (of, _) in enumerate(campaign.own) if of == k]
-        mean = made.common[campaign.means][rows]
+    for one in tried:
         kept = np.ones(len(H), dtype=bool)
-        kept[[g - len(campaign.own) + j for j in rows]] = kept[[g + j for j in rows]] = False
+        kept[[g - len(campaign.own) + j for j in one.rows]] = kept[[g + j for j in one.rows]] = False
         factor = cho_factor(H[np.ix_(kept, kept)])
-        for start in _starts():
-            own = made.own[i].copy()
-            own[rows] = start - mean
-            left = made.noise.white(i, campaign.gap(i, made.common, own), runs).ravel()
-            slope = J.T @ (left - w)
-            cost = float(left @ left + own**2 @ own_precision - slope[kept] @ cho_solve(factor, slope[kept]))
-            if cost < least:
-                best, least = own, cost
+        left = one.white(made.noise, i, runs)
+        slope = J[:, kept].T @ (left - w[:, None])
+        cost = np.sum(left**2, axis=0) + one.own[:, i] ** 2 @ own_precision
+        cost -= np.sum(slope * cho_solve(factor, slope), axis=0)
+        nearest = int(np.argmin(cost))
+        if cost[nearest] < least:
+            best, least = one.own[nearest, i], float(cost[nearest])
     return best
 
 
@@ -369,9 +400,8 @@ class _Point:
 
 
 def _point(campaign: Campaign, common: Floats, own: Floats, hull: list[Floats] | None = None) -> _Point:
-    places = range(len(campaign.members))
-    kept = hull or over(lambda i: campaign.hull_slopes(i, common, own[i]), places)
-    gaps, slopes = zip(*over(lambda i: campaign.linearised(i, common, own[i], kept[i]), places), strict=True)
+    kept = campaign.hull_slopes(common, own) if hull is None else hull
+    gaps, slopes = zip(*campaign.linearised(common, own, kept), strict=True)
     return _Point(common, own, list(gaps), list(slopes), kept)
 
 
@@ -399,18 +429,13 @@ def _step(made: CampaignFit, at: _Point) -> tuple[_Point, float]:
     step, own_step = made.normal.step(made.common)
     for share in HALVINGS:
         common, own = made.common + share * step, made.own + share * own_step
-        places = range(len(own))
-        there = cost(common, own, over(partial(_gap, campaign, common, own), places))
+        there = cost(common, own, campaign.gaps(common, own))
         if there < now:
             # The gaps bend with the masses, and where a flow or a property changes how the hull's coefficients act.
             bends = any(one.effect.changes_hull for one in (*campaign.conditions, *campaign.properties))
             bends = bends or float(np.abs(share * step[: len(campaign.hull.mean)]).max()) > KEPT_SLOPES
             return _point(campaign, common, own, None if bends else at.hull), now - there
     return at, 0.0
-
-
-def _gap(campaign: Campaign, common: Floats, own: Floats, i: int) -> Floats:
-    return campaign.gap(i, common, own[i])
 
 
 def bare_campaign(campaign: Campaign) -> Campaign:
@@ -424,7 +449,7 @@ def _first(campaign: Campaign, bare: CampaignFit | None) -> tuple[Spreads, _Poin
     # Some properties, such as a dead band, have no slope where they do not act.
     begun = [0.0 if one.start is None else (one.start - one.neutral) / one.size for one in campaign.lasting]
     common[campaign.g - len(campaign.own) - len(begun) : campaign.g - len(campaign.own)] = begun
-    gaps = np.vstack([campaign.gap(i, common, one) for i, one in enumerate(own)])
+    gaps = np.vstack(campaign.gaps(common, own))
     steady = STEADY_SHARE * np.sqrt(np.mean(gaps**2, axis=0))
     spreads = Spreads((1.0,) * len(campaign.conditions), np.maximum(steady, 1e-12))
     if not campaign.own:
@@ -434,37 +459,37 @@ def _first(campaign: Campaign, bare: CampaignFit | None) -> tuple[Spreads, _Poin
     common[:h] = made.common[:h]
     own[:, -3:] = made.own
     spreads = Spreads(spreads.conditions, made.spreads.steady)
-    found = over(lambda i: _started(campaign, made, i, common, own[i]), range(len(own)))
-    starts = np.stack(found)
+    starts = _started(campaign, made, common, own)
     common[campaign.means] = starts.mean(axis=0)
     own[:, : len(campaign.own)] = starts - starts.mean(axis=0)
     return spreads, _point(campaign, common, own)
 
 
-def _started(campaign: Campaign, bare: CampaignFit, i: int, common: Floats, own: Floats) -> Floats:
-    """Return the conditions of a log to begin with: those that explain most beside a hull and a steady force that may move."""
-    part, g = bare.parts[i], bare.campaign.g
-    runs = campaign.members[i].windows.runs
-    J = part.slopes.reshape(-1, part.slopes.shape[2])
+def _started(campaign: Campaign, bare: CampaignFit, common: Floats, own: Floats) -> Floats:
+    """Return the conditions of every log to begin with, shape (L, own): those that explain most beside a hull and a steady
+    force that may move.
+    """
+    g, at = bare.campaign.g, own.copy()
     precision = np.concatenate([np.ones(g), bare.campaign.own_precision(bare.spreads)])
-    away = np.concatenate([bare.common, bare.own[i]])
-    factor = cho_factor(J.T @ J + np.diag(precision))
-    best, least = np.zeros(len(campaign.own)), np.inf
+
+    def costs(i: int, tried: _Tried) -> Floats:
+        part = bare.parts[i]
+        J = part.slopes.reshape(-1, part.slopes.shape[2])
+        left = tried.white(bare.noise, i, campaign.members[i].windows.runs)
+        slope = J.T @ left + (precision * np.concatenate([bare.common, bare.own[i]]))[:, None]
+        solved = cho_solve(cho_factor(J.T @ J + np.diag(precision)), slope)
+        away = tried.own[:, i, : len(campaign.own)]
+        return np.asarray(np.sum(left**2, axis=0) + np.sum(away**2, axis=1) - np.sum(slope * solved, axis=0))
+
+    least = np.full(len(own), np.inf)
     for k in range(len(campaign.conditions)):
-        rows = [j for j, (of, _) in enumerate(campaign.own) if of == k]
-        chosen = best.copy()
-        for start in _starts():
-            tried = best.copy()
-            tried[rows] = start
-            at = own.copy()
-            at[: len(tried)] = tried
-            w = bare.noise.white(i, campaign.gap(i, common, at), runs).ravel()
-            slope = J.T @ w + precision * away
-            cost = float(w @ w + tried @ tried - slope @ cho_solve(factor, slope))
-            if cost < least:
-                chosen, least = tried, cost
-        best = chosen
-    return best
+        tried = _Tried.of(campaign, _rows(campaign, k), common, at, _starts())
+        every = over(partial(costs, tried=tried), range(len(own)))
+        for i, cost in enumerate(every):
+            nearest = int(np.argmin(cost))
+            if cost[nearest] < least[i]:
+                at[i], least[i] = tried.own[nearest, i], cost[nearest]
+    return at[:, : len(campaign.own)]
 
 
 def _noise(campaign: Campaign, gaps: Sequence[Floats]) -> CampaignNoise:
@@ -495,7 +520,7 @@ def _spreads(made: CampaignFit, now: Floats) -> tuple[Spreads, float]:
     second = np.stack([own**2 + np.diag(made.covariance(i))[campaign.g :] for i, own in enumerate(now)])
     conditions = []
     for k, condition in enumerate(campaign.conditions):
-        rows = [j for j, (of, _) in enumerate(campaign.own) if of == k]
+        rows = _rows(campaign, k)
         have = [i for i, one in enumerate(campaign.members) if condition.key in {each.key for each in one.conditions}]
         conditions.append(float(np.sqrt(np.mean(second[np.ix_(have, rows)]))))
     old = np.array([*before.conditions, *before.steady])

@@ -7,35 +7,26 @@ Fossen (2021), section 6.5, for cross-flow drag and lift.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 
-from ferryid.diagnose.inference.estimation import Candidate, apply_candidates
-from ferryid.diagnose.inference.weak_form import Windows
+from ferryid.diagnose.inference.campaign_logs import Member, Stack, stacked
+from ferryid.diagnose.inference.candidate import Candidate, apply_candidates
 from ferryid.effects.effect import Parameter
 from ferryid.effects.force_model import COEFFICIENTS, ForceModel, unloaded
+from ferryid.side_by_side import over
 from ferryid.types import Floats, Ints
+
+T = TypeVar("T")
 
 INDUCED = ("X_vr", "X_vv")
 """Drag of drift and turning, beside `COEFFICIENTS`."""
 DIFFERENCE_STEP = 0.02
 """Of a size, for derivatives."""
-
-
-@dataclass(frozen=True)
-class Member:
-    """One log of a vessel: its windows, its force model without effects, and the conditions that it has of its own.
-
-    Where groups of logs are compared, `group` is its group's name: properties of another group do not act in it.
-    """
-
-    windows: Windows
-    plain: ForceModel
-    conditions: tuple[Candidate, ...] = ()
-    group: str = ""
 
 
 @dataclass(frozen=True)
@@ -131,13 +122,18 @@ class Campaign:
         return slice(self.g - len(self.own), self.g)
 
     def values(self, common: Floats, own: Floats) -> tuple[list[Floats], list[Floats]]:
-        """Return the parameters of the conditions of a log and of the properties, in their units and within their limits."""
-        means = common[self.means] + own[: len(self.own)]
-        every = np.concatenate([common[len(self.hull.mean) : self.g - len(self.own)], means])
+        """Return the parameters of the conditions of a log and of the properties, in their units and within their limits.
+
+        Of several logs, with `own` of shape (L, l), those of the conditions have a row for each.
+        """
+        means = common[self.means] + own[..., : len(self.own)]
+        fixed = common[len(self.hull.mean) : self.g - len(self.own)]
+        every = np.concatenate([np.broadcast_to(fixed, (*means.shape[:-1], len(fixed))), means], axis=-1)
         first, limits, cuts = self._layout
         neutral, size, low, high = limits
-        found = np.split(np.clip(neutral + size * every[first], low, high), cuts)
-        return found[: len(self.conditions)], found[len(self.conditions) : len(self.conditions) + len(self.properties)]
+        found = np.split(np.clip(neutral + size * every[..., first], low, high), cuts, axis=-1)
+        lasting = found[len(self.conditions) : len(self.conditions) + len(self.properties)]
+        return found[: len(self.conditions)], lasting if own.ndim == 1 else [one[0] for one in lasting]
 
     @cached_property
     def _layout(self) -> tuple[Ints, Floats, list[int]]:
@@ -159,37 +155,75 @@ class Campaign:
         cuts = np.cumsum([len(one.parameters) for one in every]).tolist()
         return np.array(places, dtype=np.int64), np.array(rows).reshape(-1, 4).T, cuts
 
+    @cached_property
+    def stacks(self) -> tuple[Stack, ...]:
+        """The logs as they are worked out, short ones one after another."""
+        return stacked(self.members, self.properties)
+
     def force_model(self, i: int, common: Floats, own: Floats) -> ForceModel:
         """Return a log's force model at an estimate, without its steady acceleration."""
-        member, n = self.members[i], len(COEFFICIENTS)
+        return self._modelled(Stack((i,), self.members[i]), common, own)
+
+    def _modelled(self, stack: Stack, common: Floats, own: Floats) -> ForceModel:
+        member, n = stack.member, len(COEFFICIENTS)
         hull = self.hull.mean + self.hull.root @ common[: len(self.hull.mean)]
         modelled = induced(replace(member.plain, hull=hull[:n]), hull[n:])
-        return self.acted(modelled, member.conditions, common, own, member.group)
+        return self.acted(modelled, member.conditions, common, own, member.group, stack.rows)
 
     def acted(
-        self, modelled: ForceModel, conditions: Sequence[Candidate], common: Floats, own: Floats, group: str = ""
+        self,
+        modelled: ForceModel,
+        conditions: Sequence[Candidate],
+        common: Floats,
+        own: Floats,
+        group: str = "",
+        rows: Ints | None = None,
     ) -> ForceModel:
-        """Return a force model in which a log's conditions and the properties of all logs and of its group act."""
+        """Return a force model in which a log's conditions and the properties of all logs and of its group act.
+
+        Of several logs one after another, `own` has a row for each, and `rows` tells which of them each row is of.
+        """
         values, lasting = self.values(common, own)
         here = {one.key: one for one in conditions}
         candidates = [here[one.key] for one in self.conditions if one.key in here]
         mine = [p for one, p in zip(self.conditions, values, strict=True) if one.key in here]
+        if rows is not None:
+            mine = [p[rows] for p in mine]
         pairs = zip(self.properties, lasting, strict=True)
         act = [(one, p) for one, p in pairs if one.group in ("", group)]
         return apply_candidates(modelled, [*candidates, *(one for one, _ in act)], [*mine, *(p for _, p in act)])
 
     def gap(self, i: int, common: Floats, own: Floats) -> Floats:
         """Return the gaps of a log along the vessel's axes, shape (J, 3)."""
-        member = self.members[i]
-        return member.windows.along_vessel(member.windows.gap(self.force_model(i, common, own))) + own[-3:]
+        return self._gaps(Stack((i,), self.members[i]), common, own)
 
-    def hull_slopes(self, i: int, common: Floats, own: Floats) -> Floats:
-        """Return derivatives of the gaps of a log by the hull in spreads, shape (J, 3, h)."""
-        member, n = self.members[i], len(COEFFICIENTS)
-        slopes = np.zeros((len(member.windows.starts), 3, len(self.hull.mean)))
+    def _gaps(self, stack: Stack, common: Floats, own: Floats) -> Floats:
+        windows = stack.member.windows
+        gaps = windows.along_vessel(windows.gap(self._modelled(stack, common, own)))
+        return np.asarray(gaps + stack.by_window(own[..., -3:]))
+
+    def gaps(self, common: Floats, own: Floats) -> list[Floats]:
+        """Return the gaps of every log along the vessel's axes, shape (J, 3) each, by the vectors of all, shape (L, l)."""
+        return self._by_log(lambda stack: stack.parted(self._gaps(stack, common, stack.own(own))))
+
+    def _by_log(self, worked: Callable[[Stack], Sequence[T]]) -> list[T]:
+        """Return what is worked out of stacks, log by log."""
+        found = over(worked, self.stacks)
+        pairs = [
+            pair for stack, ones in zip(self.stacks, found, strict=True) for pair in zip(stack.logs, ones, strict=True)
+        ]
+        return [one for _, one in sorted(pairs, key=lambda pair: pair[0])]
+
+    def hull_slopes(self, common: Floats, own: Floats) -> list[Floats]:
+        """Return derivatives of the gaps of every log by the hull in spreads, shape (J, 3, h) each."""
+        return self._by_log(lambda stack: stack.parted(self._hull_slopes(stack, common, stack.own(own))))
+
+    def _hull_slopes(self, stack: Stack, common: Floats, own: Floats) -> Floats:
+        windows, n = stack.member.windows, len(COEFFICIENTS)
+        slopes = np.zeros((len(windows.starts), 3, len(self.hull.mean)))
         free = self.hull.free[self.hull.free < n]
         moves = DIFFERENCE_STEP * self.hull.spread[free]
-        force_model, windows = self.force_model(i, common, own), member.windows
+        force_model = self._modelled(stack, common, own)
         changes = windows.hull_changes(force_model, free, moves)
         slopes[:, :, free] = windows.along_vessel(changes) / DIFFERENCE_STEP
         rest = self.hull.free[self.hull.free >= n]
@@ -198,21 +232,36 @@ class Campaign:
             drag = windows.along_vessel(windows.drift_responses)[:, :, rest - n] / force_model.hull[0]
             slopes[:, :, rest] = drag * self.hull.spread[rest]
         elif rest.size:
-            here = self.gap(i, common, own)
+            here = self._gaps(stack, common, own)
             for k in rest.tolist():
-                slopes[:, :, k] = (self.gap(i, _moved(common, k), own) - here) / DIFFERENCE_STEP
+                slopes[:, :, k] = (self._gaps(stack, _moved(common, k), own) - here) / DIFFERENCE_STEP
         return slopes if self.hull.together is None else slopes @ self.hull.together
 
-    def linearised(self, i: int, common: Floats, own: Floats, hull_slopes: Floats) -> tuple[Floats, Floats]:
-        """Return the gaps of a log and their derivatives by both vectors, shapes (J, 3) and (J, 3, g + l)."""
-        gaps, h, m = self.gap(i, common, own), len(self.hull.mean), len(self.own)
+    def linearised(
+        self, common: Floats, own: Floats, hull_slopes: Sequence[Floats] | None = None
+    ) -> list[tuple[Floats, Floats]]:
+        """Return the gaps of every log and their derivatives by both vectors, shapes (J, 3) and (J, 3, g + l).
+
+        `hull_slopes` are those by the hull, worked out where None.
+        """
+        by_hull = self.hull_slopes(common, own) if hull_slopes is None else hull_slopes
+
+        def worked(stack: Stack) -> list[tuple[Floats, Floats]]:
+            gaps, slopes = self._linearised(stack, common, stack.own(own))
+            slopes[:, :, : len(self.hull.mean)] = np.concatenate([by_hull[i] for i in stack.logs])
+            return list(zip(stack.parted(gaps), stack.parted(slopes), strict=True))
+
+        return self._by_log(worked)
+
+    def _linearised(self, stack: Stack, common: Floats, own: Floats) -> tuple[Floats, Floats]:
+        """Return gaps and derivatives, those by the hull left open."""
+        gaps, h, m = self._gaps(stack, common, own), len(self.hull.mean), len(self.own)
         slopes = np.zeros((*gaps.shape, self.g + self.l))
-        slopes[:, :, :h] = hull_slopes
         for k in range(h, self.g - m):
-            slopes[:, :, k] = (self.gap(i, _moved(common, k), own) - gaps) / DIFFERENCE_STEP
+            slopes[:, :, k] = (self._gaps(stack, _moved(common, k), own) - gaps) / DIFFERENCE_STEP
         for k in range(m):
             # A wind near none has no slope to one side of what it has to the other: both count.
-            ahead, astern = (self.gap(i, common, _moved(own, k, sign)) for sign in (1.0, -1.0))
+            ahead, astern = (self._gaps(stack, common, _moved(own, k, sign)) for sign in (1.0, -1.0))
             slopes[:, :, self.g - m + k] = slopes[:, :, self.g + k] = (ahead - astern) / (2.0 * DIFFERENCE_STEP)
         slopes[:, :, -3:] = np.eye(3)
         return gaps, slopes
@@ -245,5 +294,5 @@ def induced_spread(length_m: float, draught_m: float, water_density: float = 100
 
 def _moved(vector: Floats, k: int, sign: float = 1.0) -> Floats:
     moved = vector.copy()
-    moved[k] += sign * DIFFERENCE_STEP
+    moved[..., k] += sign * DIFFERENCE_STEP
     return moved

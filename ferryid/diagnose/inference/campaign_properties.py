@@ -151,10 +151,8 @@ def _linearised(made: CampaignFit, candidate: Candidate, share: float) -> Start:
     first = begun.common[place : place + q]
     A, b = np.eye(g + q), np.concatenate([made.common, first])
     gained = -0.5 * float(first @ first)
-    for i, part in enumerate(made.parts):
-        here = begun.campaign.gap(i, begun.common, begun.own[i])
-        slopes = _slopes(begun, i, range(place, place + q), here)
-        both = np.concatenate([here[:, :, None], slopes], axis=2)
+    lines = _gaps_and_slopes(begun, range(place, place + q))
+    for i, (part, both) in enumerate(zip(made.parts, lines, strict=True)):
         white = made.noise.white(i, both, made.campaign.members[i].windows.runs).reshape(-1, 1 + q)
         J, was, w = part.slopes.reshape(-1, part.slopes.shape[2]), part.gaps.ravel(), white[:, 0]
         K = np.hstack([J[:, :g], white[:, 1:]])
@@ -200,11 +198,13 @@ def _estimated(made: CampaignFit, start: Start) -> ScoredProperty:
     return ScoredProperty(start.candidate, fit, fit.evidence - made.evidence)
 
 
-def _slopes(begun: CampaignFit, i: int, columns: Sequence[int], here: Floats) -> Floats:
-    """Return derivatives of the gaps of a log, shape (J, 3), by some of the common vector, shape (J, 3, columns)."""
-    slopes = []
+def _gaps_and_slopes(begun: CampaignFit, columns: Sequence[int]) -> list[Floats]:
+    """Return the gaps of every log, and their derivatives by some of the common vector, shape (J, 3, 1 + columns) each."""
+    here = begun.campaign.gaps(begun.common, begun.own)
+    every = [here]
     for k in columns:
         moved = begun.common.copy()
         moved[k] += DIFFERENCE_STEP
-        slopes.append((begun.campaign.gap(i, moved, begun.own[i]) - here) / DIFFERENCE_STEP)
-    return np.stack(slopes, axis=2)
+        there = begun.campaign.gaps(moved, begun.own)
+        every.append([(one - other) / DIFFERENCE_STEP for one, other in zip(there, here, strict=True)])
+    return [np.stack(one, axis=2) for one in zip(*every, strict=True)]

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from math import inf, isfinite
 
 import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter
-from ferryid.effects.force_model import ForceModel
+from ferryid.effects.force_model import ForceModel, Measurements
 from ferryid.effects.wording import titled
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
@@ -18,12 +18,41 @@ START_SHARES = (3.0, 2.0, 1.0, 0.75, 0.5, 0.25)
 """Shares of the way from neutral to its start at which an effect with the end of a range is weighed, as its slope is local."""
 
 
+@dataclass(frozen=True, eq=False)
+class OtherHeading:
+    """A heading that a vessel did not have, psi [rad], shape (n,)."""
+
+    psi: Floats
+    _last: list[tuple[Measurements, Measurements]] = field(default_factory=list, repr=False)
+
+    def of(self, measurements: Measurements) -> Measurements:
+        """Return the measurements with this heading; those asked for last are kept, with the loads that were worked out."""
+        last = self._last[0] if self._last else None
+        if last is None or last[0] is not measurements:
+            last = measurements, replace(measurements, eta=np.column_stack([measurements.eta[:, :2], self.psi]))
+            # A list at once: threads share it.
+            self._last[:] = [last]
+        return last[1]
+
+    def acted(self, act: Callable[[ForceModel], ForceModel], force_model: ForceModel) -> ForceModel:
+        """Return a force model in which something acts as if the vessel had had this heading."""
+        measurements = force_model.measurements
+        acted = act(replace(force_model, measurements=self.of(measurements)))
+        if acted.flow is force_model.flow or acted.flow is None:
+            return replace(force_model, external=acted.external)
+        # Water that meets the other heading from where it would have met this one.
+        cos, sin = np.cos(measurements.psi - self.psi), np.sin(measurements.psi - self.psi)
+        north, east = acted.flow.T
+        flow = np.column_stack([cos * north - sin * east, sin * north + cos * east])
+        return replace(force_model, external=acted.external, flow=flow)
+
+
 @dataclass(frozen=True)
 class Candidate:
     """An effect in one instance; `log_alternatives` as in `ferryid.effects.effect.Choice`, with `Effect.log_rarity`.
 
     It acts from `onset_s` (0: from the start of the log) until `offset_s` (infinite: to its end), in a campaign in the logs of
-    one group, or of all where `group` is empty.
+    one group, or of all where `group` is empty. One that cannot be true acts on a `heading` that the vessel did not have.
     """
 
     effect: Effect
@@ -33,6 +62,7 @@ class Candidate:
     offset_s: float = inf
     log_alternatives: float = 0.0
     group: str = ""
+    heading: OtherHeading | None = field(default=None, compare=False, repr=False)
 
     @classmethod
     def of(cls, effect: Effect, instance: str | None, profile: Profile) -> Candidate:
@@ -79,6 +109,8 @@ class Candidate:
 
     def act(self, force_model: ForceModel, p: Floats) -> ForceModel:
         """Return the force model with the effect in it."""
+        if self.heading is not None:
+            return self.heading.acted(lambda other: replace(self, heading=None).act(other, p), force_model)
         return self.effect.act(force_model, p, self.instance, self.onset_s, self.offset_s)
 
 

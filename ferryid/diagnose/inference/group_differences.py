@@ -277,16 +277,16 @@ def _slopes(made: CampaignFit, candidate: Candidate, z: Floats) -> list[Floats]:
     common = everywhere.common.copy()
     common[first : first + len(z)] = z
 
-    def slopes(i: int) -> Floats:
-        here = everywhere.campaign.gap(i, common, made.own[i])
-        columns = []
-        for k in range(len(z)):
-            moved = common.copy()
-            moved[first + k] += DIFFERENCE_STEP
-            columns.append((everywhere.campaign.gap(i, moved, made.own[i]) - here) / DIFFERENCE_STEP)
-        return made.noise.white(i, np.stack(columns, axis=2), made.campaign.members[i].windows.runs)
-
-    return over(slopes, range(len(made.parts)))
+    here, columns = everywhere.campaign.gaps(common, made.own), []
+    for k in range(len(z)):
+        moved = common.copy()
+        moved[first + k] += DIFFERENCE_STEP
+        there = everywhere.campaign.gaps(moved, made.own)
+        columns.append([(one - other) / DIFFERENCE_STEP for one, other in zip(there, here, strict=True)])
+    return [
+        made.noise.white(i, np.stack(every, axis=2), made.campaign.members[i].windows.runs)
+        for i, every in enumerate(zip(*columns, strict=True))
+    ]
 
 
 @dataclass(frozen=True)

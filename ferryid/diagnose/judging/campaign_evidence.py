@@ -18,13 +18,13 @@ from itertools import pairwise
 import numpy as np
 
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit
-from ferryid.diagnose.inference.campaign_model import Campaign, Member
-from ferryid.diagnose.inference.estimation import Candidate
+from ferryid.diagnose.inference.campaign_logs import Member
+from ferryid.diagnose.inference.campaign_model import Campaign
+from ferryid.diagnose.inference.candidate import Candidate, OtherHeading
 from ferryid.diagnose.inference.folds import draws
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.thresholds import JUDGING
-from ferryid.effects.force_model import ForceModel
 from ferryid.side_by_side import over
 from ferryid.types import Floats, Ints
 
@@ -73,15 +73,15 @@ class Gain:
 
 def held_out_loss(made: CampaignFit) -> HeldOutLoss:
     """Return what an estimate leaves of every block if it does not know this block and what overlaps with it."""
-    found = over(lambda i: _log_loss(made, i), range(len(made.parts)))
+    lines = made.campaign.linearised(made.common, made.own)
+    found = over(lambda i: _log_loss(made, i, *lines[i]), range(len(made.parts)))
     log = np.repeat(np.arange(len(found)), [len(squares) for squares, _ in found])
     return HeldOutLoss(np.concatenate([one for one, _ in found]), log, tuple(errors for _, errors in found))
 
 
-def _log_loss(made: CampaignFit, i: int) -> tuple[Floats, Floats]:
-    part, campaign = made.parts[i], made.campaign
-    windows, own = campaign.members[i].windows, made.own[i]
-    errors, slopes = campaign.linearised(i, made.common, own, campaign.hull_slopes(i, made.common, own))
+def _log_loss(made: CampaignFit, i: int, gaps: Floats, slopes: Floats) -> tuple[Floats, Floats]:
+    """Return `HeldOutLoss.blocks` and `errors` of a log, by its gaps and their slopes."""
+    part, windows, errors = made.parts[i], made.campaign.members[i].windows, gaps.copy()
     C = made.covariance(i)
     squares = []
     for block, near in held_out_blocks(windows):
@@ -128,12 +128,13 @@ def imitated_share(made: CampaignFit, none: CampaignFit, other: CampaignFit, row
     rows
         Which parameters of a log's own conditions are the condition's.
     """
-    campaign, signals = made.campaign, []
-    for i, own in enumerate(made.own):
-        still = own.copy()
-        still[rows] = -made.common[campaign.means][rows]
-        change = campaign.gap(i, made.common, own) - campaign.gap(i, made.common, still)
-        signals.append(made.noise.white(i, change, campaign.members[i].windows.runs))
+    campaign, still = made.campaign, made.own.copy()
+    still[:, rows] = -made.common[campaign.means][rows]
+    pairs = zip(campaign.gaps(made.common, made.own), campaign.gaps(made.common, still), strict=True)
+    signals = [
+        made.noise.white(i, there - without, campaign.members[i].windows.runs)
+        for i, (there, without) in enumerate(pairs)
+    ]
     alone, itself, instead = (_left(one, signals) for one in (none, made, other))
     return (alone - instead) / max(alone - itself, 1e-12)
 
@@ -190,20 +191,7 @@ def _turned(campaign: Campaign, effect: str, headings: Sequence[Floats]) -> Camp
 
 def turned(candidate: Candidate, psi: Floats) -> Candidate:
     """Return a condition that acts as if the vessel had had another heading, shape (n,)."""
-
-    def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
-        measurements = force_model.measurements
-        other = replace(measurements, eta=np.column_stack([measurements.eta[:, :2], psi]))
-        acted = candidate.effect.apply(replace(force_model, measurements=other), p, instance)
-        if acted.flow is force_model.flow or acted.flow is None:
-            return replace(force_model, external=acted.external)
-        # Water that meets the other heading from where it would have met this one.
-        cos, sin = np.cos(measurements.psi - psi), np.sin(measurements.psi - psi)
-        north, east = acted.flow.T
-        flow = np.column_stack([cos * north - sin * east, sin * north + cos * east])
-        return replace(force_model, external=acted.external, flow=flow)
-
-    return replace(candidate, effect=replace(candidate.effect, apply=apply))
+    return replace(candidate, heading=OtherHeading(psi))
 
 
 def without_conditions(campaign: Campaign) -> Campaign:

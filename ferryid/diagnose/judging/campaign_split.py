@@ -121,13 +121,7 @@ class _Logs:
     @cached_property
     def linear(self) -> list[tuple[Floats, Floats]]:
         """Accelerations left over in every log, and their derivatives."""
-        made = self.made
-
-        def at(i: int) -> tuple[Floats, Floats]:
-            slopes = made.campaign.hull_slopes(i, made.common, made.own[i])
-            return made.campaign.linearised(i, made.common, made.own[i], slopes)
-
-        return over(at, range(len(made.parts)))
+        return self.made.campaign.linearised(self.made.common, self.made.own)
 
     def apart(self, inside: Flags) -> float:
         """Return how far the hulls of two parts are apart, by how uncertain they are: squared, over its expectation."""

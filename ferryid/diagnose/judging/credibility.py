@@ -205,10 +205,10 @@ def felt(made: CampaignFit, common: Floats, own: Floats) -> Floats:
     common, own
         Vectors of the other: of all logs, shape (g,), and of each, shape (logs, l).
     """
-    shares = []
-    for i, member in enumerate(made.campaign.members):
-        there = made.campaign.gap(i, made.common, made.own[i])
-        moved = there - made.campaign.gap(i, common, own[i])
+    campaign, shares = made.campaign, []
+    pairs = zip(campaign.gaps(made.common, made.own), campaign.gaps(common, own), strict=True)
+    for member, (there, moved) in zip(campaign.members, pairs, strict=True):
+        moved = there - moved
         measured = member.windows.along_vessel(member.windows.measured[:, member.windows.channels])
         size = np.sqrt(np.mean(measured**2, axis=0))
         shares.append(np.sqrt(np.mean(moved**2, axis=0)) / np.where(size > 0.0, size, np.inf))

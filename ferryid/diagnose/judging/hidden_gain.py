@@ -11,7 +11,7 @@ import numpy as np
 from ferryid.counts import counted
 from ferryid.diagnose.data.measurements import window_lengths
 from ferryid.diagnose.inference.campaign_estimation import estimate_campaign
-from ferryid.diagnose.inference.campaign_model import Member
+from ferryid.diagnose.inference.campaign_logs import Member
 from ferryid.diagnose.inference.folds import draws
 from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.diagnose.inference.stages import AveragedLog

@@ -14,7 +14,8 @@ from ferryid.diagnose.data.measurements import window_lengths
 from ferryid.diagnose.inference import campaign_estimation
 from ferryid.diagnose.inference.campaign import CommonHull, _conditions_of_logs
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit, estimate_campaign
-from ferryid.diagnose.inference.campaign_model import INDUCED, Campaign, HullPrior, Member
+from ferryid.diagnose.inference.campaign_logs import Member
+from ferryid.diagnose.inference.campaign_model import INDUCED, Campaign, HullPrior
 from ferryid.diagnose.inference.estimation import Candidate, estimation_problem, fit
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging import campaign_conditions
@@ -95,7 +96,7 @@ def test_slopes_by_the_hull_are_those_of_the_gaps_drag_of_drift_included(turned:
     first = replace(made.members[0], plain=replace(made.members[0].plain, turned=turned))
     made = replace(made, hull=drag, members=(first, *made.members[1:]))
     common, own = 0.1 * np.ones(made.g), np.zeros(made.l)
-    slopes = made.hull_slopes(0, common, own)
+    slopes = made.hull_slopes(common, np.zeros((3, made.l)))[0]
     for k in made.hull.free.tolist():
         ends = [made.gap(0, common + side * 1e-4 * np.eye(made.g)[k], own) for side in (1.0, -1.0)]
         by_ends = (ends[0] - ends[1]) / 2e-4

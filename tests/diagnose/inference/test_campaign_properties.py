@@ -11,7 +11,8 @@ import pytest
 from ferryid.diagnose.inference import campaign_estimation
 from ferryid.diagnose.inference import campaign_properties as selection
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit, estimate_campaign
-from ferryid.diagnose.inference.campaign_model import Campaign, Member
+from ferryid.diagnose.inference.campaign_logs import Member
+from ferryid.diagnose.inference.campaign_model import Campaign
 from ferryid.diagnose.inference.campaign_properties import (
     ScoredProperty,
     Start,

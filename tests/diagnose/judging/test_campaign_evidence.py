@@ -23,8 +23,7 @@ def fitted(slopes: Floats) -> CampaignFit:
     windows = SimpleNamespace(starts=np.arange(COUNT), weight=np.ones(4), runs=((0, COUNT),))
     campaign = SimpleNamespace(
         members=[SimpleNamespace(windows=windows)],
-        linearised=lambda *_: (gaps.copy(), slopes),
-        hull_slopes=lambda *_: None,
+        linearised=lambda *_: [(gaps, slopes)],
     )
     made = SimpleNamespace(
         parts=[SimpleNamespace(gaps=gaps, slopes=slopes)],

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ferryid.diagnose.inference.campaign_model import Campaign, Member
+from ferryid.diagnose.inference.campaign_logs import Member
+from ferryid.diagnose.inference.campaign_model import Campaign
 from ferryid.diagnose.judging import campaign_split
 from ferryid.diagnose.judging.campaign_evidence import Gain
 from ferryid.diagnose.judging.campaign_split import Split, find_split

@@ -13,7 +13,8 @@ import pytest
 
 from ferryid.diagnose.data.measurements import window_lengths
 from ferryid.diagnose.inference.campaign_estimation import estimate_campaign
-from ferryid.diagnose.inference.campaign_model import INDUCED, Campaign, HullPrior, Member
+from ferryid.diagnose.inference.campaign_logs import Member
+from ferryid.diagnose.inference.campaign_model import INDUCED, Campaign, HullPrior
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.group_differences import (
     ALL_THRUSTERS,

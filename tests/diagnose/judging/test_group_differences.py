@@ -11,7 +11,8 @@ import pytest
 
 from ferryid.diagnose.inference import group_differences as inference
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit, estimate_campaign
-from ferryid.diagnose.inference.campaign_model import Campaign, Member
+from ferryid.diagnose.inference.campaign_logs import Member
+from ferryid.diagnose.inference.campaign_model import Campaign
 from ferryid.diagnose.inference.campaign_properties import properties_of, with_property
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.group_differences import Comparison, compare_near, differences_of, in_groups

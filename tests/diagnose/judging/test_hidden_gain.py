@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.data.estimate import Estimate
-from ferryid.diagnose.inference.campaign_model import Member
+from ferryid.diagnose.inference.campaign_logs import Member
 from ferryid.diagnose.judging.campaign_conditions import judge_conditions
 from ferryid.diagnose.judging.diagnosis import Withheld
 from ferryid.diagnose.judging.hidden_gain import HiddenGain, bridged, gain_of
