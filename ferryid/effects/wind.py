@@ -31,7 +31,6 @@ against it, a wind from the other side may be likelier than none, and than all b
 MEAN_WEIGHTS = np.array([1.0 / 3.0, *[1.0 / 6.0] * 4])
 """Of the loads of a wind as it is on average and in the four gusts of `mean_load`."""
 MEAN_GUSTS = np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
-_AS_IT_IS = np.zeros((1, 2)), np.ones(1)
 KEPT = 8
 """Loads of winds that are kept beside the measurements."""
 
@@ -103,7 +102,9 @@ def mean_load(measurements: Measurements, air: Floats, gust_std: float) -> Float
 
 
 def _mean_load(measurements: Measurements, air: Floats, gust_std: float) -> Floats:
-    away, weights = _AS_IT_IS if gust_std == 0.0 else (sqrt(3.0) * gust_std * MEAN_GUSTS, MEAN_WEIGHTS)
+    away, weights = np.zeros((1, 2)), np.ones(1)
+    if gust_std != 0.0:
+        away, weights = sqrt(3.0) * gust_std * MEAN_GUSTS, MEAN_WEIGHTS
     if air.ndim > 1:
         return wind_load_by_row(measurements, air, away, weights)
     return wind_load(measurements, air + away, weights)

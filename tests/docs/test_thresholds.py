@@ -133,12 +133,13 @@ NO_DECISION = {
         diagnose.inference.search COARSE_ITERATIONS
         diagnose.inference.stochastic_disturbance START_STRENGTHS START_FREQUENCIES GIVEN_WAY GROWTH_ROUNDS
         diagnose.inference.disturbance_course GROWTHS FINEST_FACTOR GROWTH_DIFFERENCE
-        diagnose.judging.findings TIME_STEP TIME_FIT TIME_FINE_S TIMES_AT_ONCE TIME_STRAIGHT
+        diagnose.judging.findings TIME_FIT
+        diagnose.judging.time_posterior TIME_STEP LONGEST_STEP TIME_FINE_S TIMES_AT_ONCE BENT_SHARE LARGEST_SHARE
         diagnose.judging.campaign_split WEIGHED
         effects.gusts DIFFERENCE_MPS
         effects.linear_evidence DIFFERENCE_STEP
         effects.shallow_water CELLS
-        effects.wind SPEEDS_MPS BEARINGS MEAN_WEIGHTS
+        effects.wind SPEEDS_MPS BEARINGS MEAN_GUSTS MEAN_WEIGHTS
         identify.feasible _ROUNDS _SHARES _DIRECTIONS _TIE_STEPS
         identify.log_conditions _DIRECTIONS _SPEEDS _STEP_MPS
         identify.condition_estimation STEPS _FIRST_STEADY
@@ -164,6 +165,7 @@ NO_DECISION = {
         draft.servo_functions _OUTPUTS
         draft.autopilot_parameters SHOWN_CHANGES
         draft.actuator_fields _MOST_SHARED
+        diagnose.inference.campaign_logs MOST_ROWS
         diagnose.inference.folds DRAWS
         diagnose.inference.onset_estimation MOST_VALUES
         diagnose.inference.simulation_baseline SHOWN_ROWS

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
-from itertools import pairwise
 from math import inf
 from typing import Any
 
@@ -23,7 +22,6 @@ from ferryid.diagnose.inference.feedback import OUT_OF_STEP, feedback_of
 from ferryid.diagnose.inference.folds import block_s
 from ferryid.diagnose.inference.onset_estimation import lasts_s, replace_candidate
 from ferryid.diagnose.inference.profile_likelihood import intervals
-from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.backward_elimination import Elimination
 from ferryid.diagnose.judging.claims import Claim, Figures
 from ferryid.diagnose.judging.credibility import interval_doubt, value_doubt
@@ -33,19 +31,12 @@ from ferryid.diagnose.judging.finding import Finding, Rival
 from ferryid.diagnose.judging.held_out import Proof
 from ferryid.diagnose.judging.locate import locate
 from ferryid.diagnose.judging.onset_evidence import sets_in
-from ferryid.diagnose.judging.thresholds import JUDGING
+from ferryid.diagnose.judging.time_posterior import TimePosterior
 from ferryid.effects.force_model import Measurements
-from ferryid.side_by_side import over
 from ferryid.types import AXES, Floats
 
-TIME_STEP, TIME_FIT = 0.125, 3
-"""Step between times that are weighed, in lengths of a window, and steps of the fit for each."""
-TIME_FINE_S = 0.2
-"""Fine step between times that are compared [s]: that of the forces."""
-TIMES_AT_ONCE = 4
-"""Times to either side that are weighed before it is seen whether to go on."""
-TIME_STRAIGHT = 0.1
-"""How far the log evidence of a time may be off the line between its neighbours before times between them are weighed [nat]."""
+TIME_FIT = 3
+"""Steps of the fit for each time that an effect may have begun or ended at."""
 SHOWN_RIVALS = 3
 
 
@@ -225,8 +216,6 @@ def _value(estimates: Mapping[str, Estimate], name: str) -> float | None:
 def _time(problem: EstimationProblem, kept: Fit, index: int, end: str) -> Estimate:
     """Return when an effect began or ended, as the median of its posterior with the interval.
 
-    An idle thruster hides its fault, so that the posterior may be wide, and have several tops.
-
     Parameters
     ----------
     problem, kept, index
@@ -236,8 +225,7 @@ def _time(problem: EstimationProblem, kept: Fit, index: int, end: str) -> Estima
     """
     candidate = kept.candidates[index]
     middles = problem.windows.middle_s
-    step = TIME_STEP * len(problem.windows.weight) * problem.windows.measurements.step_s
-
+    window_s = len(problem.windows.weight) * problem.windows.measurements.step_s
     begin = starting_point(problem, kept)
 
     def evidence_at(time: float) -> float:
@@ -247,44 +235,8 @@ def _time(problem: EstimationProblem, kept: Fit, index: int, end: str) -> Estima
     # It ends after it began.
     first = max(candidate.onset_s, float(middles[0])) if end == "offset_s" else float(middles[0])
     last = min(candidate.offset_s, float(middles[-1])) if end == "onset_s" else float(middles[-1])
-    here = getattr(candidate, end)
-    tried = {here: evidence_at(here)}
-
-    def explore(moments: Iterable[float]) -> None:
-        new = [
-            one
-            for one in moments
-            if first < one < last and min(abs(one - other) for other in tried) > 0.5 * TIME_FINE_S
-        ]
-        tried.update(zip(new, over(evidence_at, new), strict=True))
-
-    # Several at once, for threads.
-    counts = np.arange(1, TIMES_AT_ONCE + 1)
-    ends = {-1.0: here, 1.0: here}
-    while ends:
-        new = {side: (end + side * step * counts).tolist() for side, end in ends.items()}
-        explore([time for times in new.values() for time in times])
-        lowest = max(tried.values()) - JUDGING.time_drop
-        ends = {side: times[-1] for side, times in new.items() if min(tried.get(one, -inf) for one in times) >= lowest}
-    # About the likeliest it changes within a step; elsewhere only where it does not lie on a line between its neighbours.
-    fine = round(step / TIME_FINE_S)
-    likeliest = max(tried, key=tried.__getitem__)
-    explore((likeliest + TIME_FINE_S * np.arange(-fine, fine + 1)).tolist())
-    lowest = max(tried.values()) - JUDGING.fine_time_drop
-    gaps = [pair for pair in pairwise(sorted(tried)) if max(tried[one] for one in pair) > lowest]
-    while gaps := [(a, b) for a, b in gaps if b - a > 1.5 * TIME_FINE_S]:
-        explore([0.5 * (a + b) for a, b in gaps])
-        halved = [(a, 0.5 * (a + b), b) for a, b in gaps]
-        bent = [one for one in halved if abs(tried[one[1]] - 0.5 * (tried[one[0]] + tried[one[2]])) > TIME_STRAIGHT]
-        gaps = [pair for one in bent for pair in pairwise(one)]
-    moments = np.array(sorted(tried))
-    # Each moment stands for the time about it; the posterior is as much wider as that of other parameters.
-    edges = np.concatenate([moments[:1], 0.5 * (moments[1:] + moments[:-1]), moments[-1:]])
-    edges[[0, -1]] += np.array([-0.5, 0.5]) * TIME_FINE_S
-    log_weights = np.array([tried[time] for time in moments.tolist()]) / INFERENCE.posterior_factor**2
-    weights = np.exp(log_weights - log_weights.max()) * np.diff(edges)
-    shares = np.concatenate([[0.0], np.cumsum(weights) / weights.sum()])
-    low, middle, high = np.interp([0.025, 0.5, 0.975], shares, edges).tolist()
+    found = TimePosterior.about(evidence_at, getattr(candidate, end), first, last, window_s)
+    low, middle, high = found.quantiles(np.array([0.025, 0.5, 0.975])).tolist()
     # Forces have a value a row: within one, nothing is known of when they change.
     row_s = problem.windows.measurements.step_s
     return Estimate(middle, max(low - row_s, 0.0), high + row_s, "s")

@@ -342,10 +342,10 @@ class JudgingThresholds:
         "convention: smaller dips may lie between two maxima",
     )
     fine_time_drop: float = threshold(
-        10.0,
+        20.0,
         "nat",
-        "fall of the log evidence within which onset and end are searched in the steps of the forces",
-        "convention: times farther down have about one per cent of the largest density, by the posterior factor",
+        "fall of the log evidence within which times of an onset or end are weighed between their neighbours",
+        "convention: twice what leaves one per cent of the largest density, by the posterior factor: a top may lie between",
     )
     bin_windows: int = threshold(
         4, "windows", "least windows in a bin of an error profile", "convention: fewer have no scatter to judge by"

@@ -13,6 +13,7 @@ import pytest
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging import findings
+from ferryid.diagnose.judging.time_posterior import TimePosterior
 from ferryid.effects import effects
 from ferryid.vessel import load_profile
 
@@ -22,11 +23,13 @@ from ferryid.vessel import load_profile
     ("evidence", "most"),
     [
         (lambda t: -4.0 * abs(t - 300.3), 60),
-        (lambda t: -0.5 * ((t - 260.0) / 40.0) ** 2, 1100),
-        (lambda t: float(np.logaddexp(-0.3 * abs(t - 300.3), 1.0 - 0.5 * ((t - 180.0) / 9.0) ** 2)), 1100),
-        (lambda t: 0.0 if 290.1 < t < 310.5 else -12.0, 1100),
+        (lambda t: -0.5 * ((t - 260.0) / 40.0) ** 2, 250),
+        (lambda t: float(np.logaddexp(-0.3 * abs(t - 300.3), 1.0 - 0.5 * ((t - 180.0) / 9.0) ** 2)), 200),
+        (lambda t: 0.0 if 290.1 < t < 310.5 else -12.0, 320),
+        (lambda t: -0.02 * abs(t - 300.3), 250),
+        (lambda t: -0.02 * abs(t - 300.3) + 1.5 * np.sin(t / 4.0), 450),
     ],
-    ids=["sharp", "broad", "two tops", "steps"],
+    ids=["sharp", "broad", "two tops", "steps", "the whole log", "ragged"],
 )
 def test_a_time_has_the_quantiles_of_its_posterior_by_few_fits(
     evidence: Callable[[float], float], most: int, monkeypatch: pytest.MonkeyPatch
@@ -53,3 +56,38 @@ def test_a_time_has_the_quantiles_of_its_posterior_by_few_fits(
         [found.low + 0.2, found.value, found.high - 0.2], [low, middle, high], atol=0.1 + 0.02 * (high - low)
     )
     assert len(set(tried)) == len(tried) <= most
+
+
+def _flat_from_the_start(t: float) -> float:
+    return -0.1 * max(t - 39.0, 0.0)
+
+
+def _saw(t: float) -> float:
+    return -0.05 * abs(t - 300.3) + 4.0 * ((t / 7.3) % 1.0)
+
+
+def _uneven_tail(t: float) -> float:
+    tail = -11.0 - 0.5 * ((t - 420.0) / 20.0) ** 2 + 5.0 * np.sin(2.0 * np.pi * t / 6.5)
+    return float(np.logaddexp(-2.0 * abs(t - 300.3), tail))
+
+
+@pytest.mark.parametrize(
+    ("evidence", "here", "near"),
+    [
+        (_flat_from_the_start, 39.0, (0.1, 0.1, 0.1)),
+        (_saw, 300.3, (4.0, 0.5, 4.0)),
+        (_uneven_tail, 300.3, (0.1, 0.3, 2.5)),
+    ],
+    ids=["begins with the log", "many tops", "a tail of many tops"],
+)
+def test_an_uneven_posterior_is_followed_where_it_counts(
+    evidence: Callable[[float], float], here: float, near: tuple[float, float, float]
+) -> None:
+    shares = np.array([0.025, 0.5, 0.975])
+    found = TimePosterior.about(evidence, here, 4.0, 714.0, 8.0)
+    every = np.arange(4.0, 714.0, 0.02)
+    density = np.exp(np.array([evidence(t) for t in every.tolist()]) / INFERENCE.posterior_factor**2)
+    expected = np.interp(shares, np.cumsum(density) / density.sum(), every)
+    assert (np.abs(found.quantiles(shares) - expected) < near).all()
+    # As dense as forces are it would take thousands.
+    assert len(found.tried) < 450
