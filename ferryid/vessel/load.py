@@ -7,6 +7,7 @@ import os
 import re
 import sys
 import tomllib
+from functools import lru_cache
 from importlib import resources
 from pathlib import Path
 
@@ -61,8 +62,11 @@ def load_profile(name_or_path: str | Path) -> Profile:
     return parse_profile(text, where)
 
 
+@lru_cache(maxsize=16)
 def parse_profile(text: str, where: str) -> Profile:
     """Parse the text of a profile; `where` names it in messages and becomes `Profile.path`.
+
+    Those parsed last are kept: a stored model has its profile as text, and is asked for what it expects of log after log.
 
     Raises
     ------

@@ -117,10 +117,10 @@ class CampaignFit:
         A log's gradient at the common estimate has its normal matrix as covariance if nothing but noise sets it apart.
         """
         apart, expected, logs = 0.0, 0.0, len(self.parts)
-        for H, slope in zip(self.normal.matrices, self.normal.slopes, strict=True):
-            inverse = np.linalg.inv(H + np.eye(len(H)))
+        inverses = np.linalg.inv(self.normal.matrices + np.eye(self.campaign.g))
+        for H, slope, inverse in zip(self.normal.matrices, self.normal.slopes, inverses, strict=True):
             apart += float(slope @ inverse @ slope)
-            expected += float(np.trace(H @ inverse))
+            expected += float(np.sum(H * inverse.T))
         return apart / max(expected * (1.0 - 1.0 / logs), 1e-12) if logs > 1 else 1.0
 
     def belief(self, without: int | None = None) -> tuple[Floats, Floats]:
@@ -182,7 +182,7 @@ class CampaignFit:
     def evidence(self) -> float:
         """Logarithm of the evidence (Laplace), but for what only the noise decides."""
         precision = self.campaign.own_precision(self.spreads)
-        logarithm = sum(float(np.linalg.slogdet(Q)[1] - np.sum(np.log(precision))) for Q in self.normal.own)
+        logarithm = float(np.sum(np.linalg.slogdet(self.normal.own)[1] - np.sum(np.log(precision))))
         A = np.eye(self.campaign.g) + np.sum(self.normal.matrices, axis=0)
         rarity = sum(one.log_alternatives for one in (*self.campaign.conditions, *self.campaign.properties))
         return -0.5 * self.cost - 0.5 * logarithm - 0.5 * float(np.linalg.slogdet(A)[1]) - rarity
@@ -197,33 +197,29 @@ class _Eliminated:
     matrices, slopes
         By log: what it says of the common vector, shapes (L, g, g) and (L, g).
     own, back
-        By log: its own normal matrix, shape (l, l), and how its own vector follows the common one, shape (l, g).
+        By log: its own normal matrix, shape (L, l, l), and how its own vector follows the common one, shape (L, l, g).
     own_slopes
         By log, shape (L, l).
     """
 
     matrices: Floats
     slopes: Floats
-    own: tuple[Floats, ...]
-    back: tuple[Floats, ...]
+    own: Floats
+    back: Floats
     own_slopes: Floats
 
     @classmethod
     def of(cls, made: CampaignFit) -> _Eliminated:
         g, precision = made.campaign.g, made.campaign.own_precision(made.spreads)
-        matrices, slopes, own, back, own_slopes = [], [], [], [], []
-        for mine, part in zip(made.own, made.parts, strict=True):
-            J, w = part.slopes.reshape(-1, part.slopes.shape[2]), part.gaps.ravel()
-            N, b = J.T @ J, J.T @ w
-            Q, gradient = N[g:, g:] + np.diag(precision), b[g:] + precision * mine
-            factor = cho_factor(Q)
-            follow = cho_solve(factor, N[g:, :g])
-            matrices.append(N[:g, :g] - N[:g, g:] @ follow)
-            slopes.append(b[:g] - follow.T @ gradient)
-            own.append(Q)
-            back.append(follow)
-            own_slopes.append(gradient)
-        return cls(np.stack(matrices), np.stack(slopes), tuple(own), tuple(back), np.stack(own_slopes))
+        # Logs are of many lengths, their normal equations of one size.
+        flat = [part.slopes.reshape(-1, part.slopes.shape[2]) for part in made.parts]
+        N = np.stack([J.T @ J for J in flat])
+        b = np.stack([J.T @ part.gaps.ravel() for J, part in zip(flat, made.parts, strict=True)])
+        Q, gradient = N[:, g:, g:] + np.diag(precision), b[:, g:] + precision * made.own
+        back = np.asarray(np.linalg.solve(Q, N[:, g:, :g]), dtype=np.float64)
+        matrices = N[:, :g, :g] - N[:, :g, g:] @ back
+        slopes = b[:, :g] - np.einsum("ilg,il->ig", back, gradient)
+        return cls(matrices, slopes, Q, back, gradient)
 
     @cached_property
     def common_covariance(self) -> Floats:
@@ -231,21 +227,23 @@ class _Eliminated:
         A = np.eye(self.matrices.shape[1]) + np.sum(self.matrices, axis=0)
         return np.asarray(np.linalg.inv(A), dtype=np.float64)
 
+    @cached_property
+    def own_covariances(self) -> Floats:
+        """Posterior covariances of the logs' own vectors, shape (L, l, l)."""
+        back = self.back
+        return np.asarray(np.linalg.inv(self.own) + back @ self.common_covariance @ np.swapaxes(back, 1, 2))
+
     def covariance(self, i: int) -> Floats:
         """Return the posterior covariance of the common vector and that of a log, shape (g + l, g + l)."""
-        C, back = self.common_covariance, self.back[i]
-        across = -C @ back.T
-        return np.block([[C, across], [across.T, np.linalg.inv(self.own[i]) + back @ C @ back.T]])
+        C = self.common_covariance
+        across = -C @ self.back[i].T
+        return np.block([[C, across], [across.T, self.own_covariances[i]]])
 
     def step(self, common: Floats) -> tuple[Floats, Floats]:
         """Return the Gauss-Newton step of the common vector and of each log's own, shapes (g,) and (L, l)."""
         A = np.eye(len(common)) + np.sum(self.matrices, axis=0)
         step = -np.linalg.solve(A, common + np.sum(self.slopes, axis=0))
-        own = [
-            -np.linalg.solve(Q, gradient) - back @ step
-            for Q, gradient, back in zip(self.own, self.own_slopes, self.back, strict=True)
-        ]
-        return step, np.stack(own)
+        return step, -np.linalg.solve(self.own, self.own_slopes[:, :, None])[:, :, 0] - self.back @ step
 
 
 def estimate_campaign(
@@ -517,7 +515,7 @@ def _spreads(made: CampaignFit, now: Floats) -> tuple[Spreads, float]:
     """
     campaign, before = made.campaign, made.spreads
     count = len(campaign.own)
-    second = np.stack([own**2 + np.diag(made.covariance(i))[campaign.g :] for i, own in enumerate(now)])
+    second = now**2 + np.diagonal(made.normal.own_covariances, axis1=1, axis2=2)
     conditions = []
     for k, condition in enumerate(campaign.conditions):
         rows = _rows(campaign, k)

@@ -99,9 +99,10 @@ def fit_coloured_noise(gaps: Floats, runs: Runs, order: int = ORDER) -> Coloured
     c = gaps.shape[1]
     lengths = [end - first for first, end in runs]
     order = next((k - 1 for k in range(1, order + 1) if sum(max(n - k, 0) for n in lengths) < PAIRS * k), order)
-    every = [_burg([gaps[first:end, channel] for first, end in runs], order) for channel in range(c)]
-    coefficients = tuple(np.array([every[channel][0][k] for channel in range(c)]) for k in range(order + 1))
-    scale = np.sqrt(np.array([every[channel][1] for channel in range(c)]).T)
+    ends = np.array(runs, dtype=np.int64).reshape(-1, 2)
+    triangle, variances = _burg(np.ascontiguousarray(gaps, dtype=np.float64), ends, order)
+    coefficients = tuple(triangle[k, :, :k] for k in range(order + 1))
+    scale = np.sqrt(variances)
     left = ColouredNoise(coefficients, scale, np.eye(c)).white(gaps, runs)
     covariance = left.T @ left / max(len(left), 1)
     size = np.sqrt(np.diag(covariance))
@@ -111,25 +112,45 @@ def fit_coloured_noise(gaps: Floats, runs: Runs, order: int = ORDER) -> Coloured
     return ColouredNoise(coefficients, scale * size, np.linalg.inv(np.linalg.cholesky(correlation)))
 
 
-def _burg(series: Sequence[Floats], order: int) -> tuple[list[Floats], list[float]]:
-    """Return coefficients and variances of all orders of one channel, from several series."""
-    forward = [one.copy() for one in series]
-    backward = [one.copy() for one in series]
-    total = sum(float(one @ one) for one in series)
-    variance = max(total / max(sum(map(len, series)), 1), 1e-300)
-    least = LEAST_VARIANCE * variance
-    found, variances = [np.zeros(0)], [variance]
-    for _ in range(order):
-        forward = [one[1:] for one in forward]
-        backward = [one[:-1] for one in backward]
-        across = sum(float(f @ b) for f, b in zip(forward, backward, strict=True))
-        power = sum(float(f @ f + b @ b) for f, b in zip(forward, backward, strict=True))
-        reflection = 2.0 * across / power if power > 0.0 else 0.0
-        before = found[-1]
-        found.append(np.append(before - reflection * before[::-1], reflection))
-        variances.append(max(variances[-1] * (1.0 - reflection**2), least))
-        forward, backward = (
-            [f - reflection * b for f, b in zip(forward, backward, strict=True)],
-            [b - reflection * f for f, b in zip(forward, backward, strict=True)],
-        )
+@compiled
+def _burg(gaps: Floats, runs: Ints, order: int) -> tuple[Floats, Floats]:
+    """Return coefficients, shape (orders, c, order), and variances, shape (orders, c), of all orders, from several series.
+
+    Parameters
+    ----------
+    gaps
+        Shape (J, c).
+    runs
+        First row of every series and the one after its last, shape (runs, 2).
+    order
+        The highest.
+    """
+    c = gaps.shape[1]
+    found, variances = np.zeros((order + 1, c, order)), np.empty((order + 1, c))
+    for j in range(c):
+        forward, backward = gaps[:, j].copy(), gaps[:, j].copy()
+        total, count = 0.0, 0
+        for run in range(runs.shape[0]):
+            for n in range(runs[run, 0], runs[run, 1]):
+                total += forward[n] * forward[n]
+                count += 1
+        variances[0, j] = max(total / max(count, 1), 1e-300)
+        least = LEAST_VARIANCE * variances[0, j]
+        for k in range(1, order + 1):
+            across, power = 0.0, 0.0
+            for run in range(runs.shape[0]):
+                for n in range(runs[run, 0] + k, runs[run, 1]):
+                    # What was left backwards stands where the series of the order before had it.
+                    f, b = forward[n], backward[n - 1]
+                    across += f * b
+                    power += f * f + b * b
+            reflection = 2.0 * across / power if power > 0.0 else 0.0
+            for i in range(k - 1):
+                found[k, j, i] = found[k - 1, j, i] - reflection * found[k - 1, j, k - 2 - i]
+            found[k, j, k - 1] = reflection
+            variances[k, j] = max(variances[k - 1, j] * (1.0 - reflection * reflection), least)
+            for run in range(runs.shape[0]):
+                for n in range(runs[run, 1] - 1, runs[run, 0] + k - 1, -1):
+                    f, b = forward[n], backward[n - 1]
+                    forward[n], backward[n] = f - reflection * b, b - reflection * f
     return found, variances

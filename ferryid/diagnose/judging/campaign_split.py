@@ -157,13 +157,17 @@ class _Logs:
             # One log cannot say: as much as logs of one vessel differ.
             return JUDGING.usual_disagreement
         A, slope = self._belief(which)
-        away = np.linalg.solve(A, slope)
-        apart, expected, one = 0.0, 0.0, np.eye(len(A))
-        for H, b in zip(self.made.normal.matrices[which], self.made.normal.slopes[which], strict=True):
-            inverse, gradient = np.linalg.inv(H + one), b + H @ away
-            apart += float(gradient @ inverse @ gradient)
-            expected += float(np.trace(H @ inverse))
-        return max(1.0, apart / max(expected * (1.0 - 1.0 / len(which)), 1e-12))
+        normal, (inverses, known) = self.made.normal, self._alone
+        gradients = normal.slopes[which] + normal.matrices[which] @ np.linalg.solve(A, slope)
+        apart = float(np.einsum("ig,igk,ik->", gradients, inverses[which], gradients))
+        return max(1.0, apart / max(float(known[which].sum()) * (1.0 - 1.0 / len(which)), 1e-12))
+
+    @cached_property
+    def _alone(self) -> tuple[Floats, Floats]:
+        """What each log alone makes of the common vector: covariances, shape (L, g, g), and how much it tells, shape (L,)."""
+        matrices = self.made.normal.matrices
+        inverses = np.asarray(np.linalg.inv(matrices + np.eye(matrices.shape[1])), dtype=np.float64)
+        return inverses, np.einsum("igk,ikg->i", matrices, inverses)
 
     def _belief(self, which: Ints, factor: float = 1.0) -> tuple[Floats, Floats]:
         """Return what some logs say of the step from the common estimate: its precision, and that times its mean."""
