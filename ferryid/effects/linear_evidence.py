@@ -49,7 +49,7 @@ def profiled_loss(J: Floats, residuals: Floats, spread: float) -> Floats:
     return np.asarray(0.5 * (np.einsum("wq,wq->q", residuals, residuals) - share))
 
 
-def log_evidence_gains(J: Floats, e: Floats, columns: Floats, size: float, spread: float) -> Floats:
+def log_evidence_gains(J: Floats, e: Floats, columns: Floats, sums: Floats, size: float, spread: float) -> Floats:
     """Return the evidence of each of some alternatives, with the hull's coefficients profiled_loss beside it.
 
     Parameters
@@ -57,15 +57,19 @@ def log_evidence_gains(J: Floats, e: Floats, columns: Floats, size: float, sprea
     J, e
         From `hull_jacobian`.
     columns
-        Derivatives of the residual by the one parameter of each alternative, shape (w, q).
+        Changes of the residual, shape (w, m).
+    sums
+        How the derivatives of the residual by the one parameter of each alternative are summed of these, shape (m, q).
     size
         Standard deviation of what is believed of that parameter.
     spread
         As of `profiled_loss`.
     """
     H, every = spread * J, np.column_stack([e, columns])
-    free = every - H @ np.linalg.solve(H.T @ H + np.eye(H.shape[1]), H.T @ every)
-    power = np.einsum("wq,wq->q", columns, free[:, 1:])
-    product = columns.T @ free[:, 0]
+    across = H.T @ every
+    # Of what the hull leaves free; alternatives are many, and what they are sums of is not.
+    free = every.T @ every - across.T @ np.linalg.solve(H.T @ H + np.eye(H.shape[1]), across)
+    power = np.einsum("mq,mq->q", sums, free[1:, 1:] @ sums)
+    product = sums.T @ free[1:, 0]
     ratio = power * size**2
     return np.asarray(0.5 * product**2 * size**2 / (1.0 + ratio) - 0.5 * np.log1p(ratio))

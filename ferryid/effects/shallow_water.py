@@ -23,8 +23,6 @@ EDGE_M = 2.0
 """Width over which the factor comes in at a side, outside of it."""
 CELLS = 8
 """Cells of the grid along north and east each."""
-MOST_VALUES = 3e6
-"""Numbers of the residuals of rectangles that are held at once: those of all need gigabytes in a log of hours."""
 FACTOR = Parameter("factor", "-", 0.4, 1.0, 6.0, neutral=1.0)
 SIDES = ("south", "north", "west", "east")
 HEAVIER = Parameter("added_mass", "-", 0.3, 0.0, 2.0, start=0.2)
@@ -71,16 +69,15 @@ def choose(force_model: ForceModel, prior_hull: Floats, residual: Residual) -> C
     lines = np.linspace(low, high, CELLS + 1)
     cell = np.clip(((place - low) / np.maximum(high - low, 1e-9) * CELLS).astype(np.int64), 0, CELLS - 1)
     e = residual(force_model)
-    by_cell, share = np.zeros((CELLS, CELLS, len(e))), np.zeros((CELLS, CELLS))
+    # Columns of rectangles are sums of those of their cells.
+    changes, cells, share = list[Floats](), list[tuple[int, int]](), np.zeros((CELLS, CELLS))
     for i in range(CELLS):
         for j in range(CELLS):
             rows = (cell[:, 0] == i) & (cell[:, 1] == j)
             share[i, j] = float(np.mean(rows[measurements.usable]))
             if share[i, j] > 0.0:
-                by_cell[i, j] = (residual(force_model.damped(1.0 + 0.5 * rows)) - e) / 0.5
-    # Columns of rectangles are sums of those of their cells, here as differences of sums from the corner.
-    sums = np.zeros((CELLS + 1, CELLS + 1, len(e)))
-    sums[1:, 1:] = by_cell.cumsum(axis=0).cumsum(axis=1)
+                changes.append((residual(force_model.damped(1.0 + 0.5 * rows)) - e) / 0.5)
+                cells.append((i, j))
     shares = np.zeros((CELLS + 1, CELLS + 1))
     shares[1:, 1:] = share.cumsum(axis=0).cumsum(axis=1)
     a, b = np.triu_indices(CELLS + 1, 1)
@@ -100,13 +97,10 @@ def choose(force_model: ForceModel, prior_hull: Floats, residual: Residual) -> C
         return Choice(parameters_of(measurements.profile), 0.0)
     south, north, west, east = south[fits], north[fits], west[fits], east[fits]
     J, linear = hull_jacobian(force_model, prior_hull, residual, np.flatnonzero(prior_hull).tolist())
-    spread, gains = hull_model_spread(measurements.profile), np.empty(len(south))
-    at_once = max(1, int(MOST_VALUES / len(e)))
-    for first in range(0, len(south), at_once):
-        some = slice(first, first + at_once)
-        a, b, c, d = south[some], north[some], west[some], east[some]
-        columns = (sums[b, d] - sums[a, d] - sums[b, c] + sums[a, c]).T
-        gains[some] = log_evidence_gains(J, linear, columns, FACTOR.size, spread)
+    x, y = np.array(cells).T[:, :, None]
+    inside_of = (south <= x) & (x < north) & (west <= y) & (y < east)
+    spread = hull_model_spread(measurements.profile)
+    gains = log_evidence_gains(J, linear, np.column_stack(changes), inside_of.astype(np.float64), FACTOR.size, spread)
     k = int(np.argmax(gains))
     sides = (lines[south[k], 0], lines[north[k], 0], lines[west[k], 1], lines[east[k], 1])
     sizes = np.repeat((high - low) / CELLS, 2)

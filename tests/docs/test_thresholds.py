@@ -190,7 +190,6 @@ NO_DECISION = {
         identify.sweeps.weak_sweep USUAL _WINDOWS_A_FOLD
         identify.window_length TRAINING_LENGTHS
         models.forces.estimator CHUNK_ROWS
-        effects.shallow_water MOST_VALUES
         effects.wind_loads BLOCK
         effects.wind KEPT
         models.forces.residual _RUNS

@@ -10,6 +10,7 @@ import pytest
 
 from ferryid.effects import effects, shallow_water
 from ferryid.effects.force_model import ForceModel, Measurements, acceleration, hull_of
+from ferryid.effects.linear_evidence import log_evidence_gains
 from ferryid.effects.shallow_water import EDGE_M, HEAVIER, SIDES
 from ferryid.vessel import load_profile
 
@@ -97,7 +98,7 @@ def test_a_strip_that_is_crossed_often_needs_no_share_of_the_log(visits: int, wa
 
 
 @pytest.mark.slow
-def test_a_place_is_chosen_in_little_memory_and_the_same_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_place_is_chosen_in_little_memory() -> None:
     force_model = sailed()
     p = values(south=30.0, north=60.0, west=10.0, east=30.0)
     measured = acceleration(EFFECT.apply(force_model, p, None))
@@ -114,9 +115,19 @@ def test_a_place_is_chosen_in_little_memory_and_the_same_in_parts(monkeypatch: p
     tracemalloc.stop()
     # All rectangles at once need 200 MB.
     assert peak < 160e6
-    monkeypatch.setattr(shallow_water, "MOST_VALUES", 1e5)
-    in_parts = choose(force_model, hull, residual)
-    assert (in_parts.parameters, in_parts.log_alternatives) == (chosen.parameters, chosen.log_alternatives)
+
+
+def test_the_evidence_of_sums_is_that_of_each_column_by_itself() -> None:
+    rng = np.random.default_rng(5)
+    J, e, columns = rng.normal(size=(200, 4)), rng.normal(size=200), rng.normal(size=(200, 6))
+    sums, size, spread = rng.integers(0, 2, (6, 9)).astype(float), 0.4, 0.3
+    found = log_evidence_gains(J, e, columns, sums, size, spread)
+    # The hull and a parameter of this size are integrated out of a normal density.
+    rest = spread**2 * J @ J.T + np.eye(200)
+    for k, column in enumerate((columns @ sums).T):
+        whole = rest + size**2 * np.outer(column, column)
+        apart = [-0.5 * (e @ np.linalg.solve(one, e) + np.linalg.slogdet(one)[1]) for one in (whole, rest)]
+        assert found[k] == pytest.approx(apart[0] - apart[1], abs=1e-9)
 
 
 @pytest.mark.parametrize(

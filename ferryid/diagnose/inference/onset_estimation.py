@@ -218,21 +218,22 @@ def _cross_products(
     problem: EstimationProblem, linearisation: Linearisation, candidate: Candidate, edges: Floats
 ) -> tuple[Floats, Floats]:
     """Return cross-products of what a candidate adds in every part, shape (parts, p, parts, p), and of it with what is left."""
-    steps, start = problem.steps, candidate.start
-    part = np.clip(np.searchsorted(edges, steps.middle_s, side="right") - 1, 0, len(edges) - 2)
-    own = part[:, None, None] == np.arange(len(edges) - 1)
+    steps, start, parts = problem.steps, candidate.start, len(edges) - 1
+    part = np.clip(np.searchsorted(edges, steps.middle_s, side="right") - 1, 0, parts - 1)
     there = as_measured(candidate.effect.apply(linearisation.force_model, start, candidate.instance))
     columns = []
     for k, one in enumerate(candidate.parameters):
         moved = start.copy()
         moved[k] += PARAMETER_DIFFERENCE * one.size
         change = as_measured(candidate.effect.apply(linearisation.force_model, moved, candidate.instance)) - there
-        columns.append(steps.mean(steps.along(change))[:, :, None] / PARAMETER_DIFFERENCE * own)
-    p = len(columns)
-    C = problem.whitening_filter.white(np.stack(columns, axis=3).reshape(len(steps.starts), -1, (len(edges) - 1) * p))
+        columns.append(steps.mean(steps.along(change)) / PARAMETER_DIFFERENCE)
+    p, count = len(columns), len(steps.starts)
+    every = np.zeros((count, columns[0].shape[1], parts, p))
+    every[np.arange(count), :, part] = np.stack(columns, axis=2)
+    C = problem.whitening_filter.white(every.reshape(count, -1, parts * p))
     shared = linearisation.slopes.T @ C
     G = C.T @ C - shared.T @ linearisation.inverse @ shared
-    return G.reshape(len(edges) - 1, p, len(edges) - 1, p), (C.T @ linearisation.left).reshape(-1, p)
+    return G.reshape(parts, p, parts, p), (C.T @ linearisation.left).reshape(-1, p)
 
 
 def _gains(G: Floats, g: Floats, a: Ints, b: Ints, candidate: Candidate) -> Floats:
