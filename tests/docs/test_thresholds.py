@@ -167,7 +167,7 @@ NO_DECISION = {
         draft.actuator_fields _MOST_SHARED
         diagnose.inference.campaign_logs MOST_ROWS
         diagnose.inference.folds DRAWS
-        diagnose.inference.onset_estimation MOST_VALUES
+        diagnose.inference.onset_estimation MOST_VALUES LATER_BLOCKS
         diagnose.inference.simulation_baseline SHOWN_ROWS
         diagnose.judging.error_profiles SECTORS SPEEDS PLACES TIMES
         diagnose.gathering CLOCK_SET_NS SHOWN_OVERLAPS

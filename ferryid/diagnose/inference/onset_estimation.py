@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from math import inf, log
 
 import numpy as np
@@ -28,6 +29,8 @@ from ferryid.effects.force_model import ForceModel, as_measured
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats, Ints
 
+LATER_BLOCKS = 8
+"""Blocks of parts whose cross-products are taken from the rows since they began."""
 MOST_VALUES = 1e7
 """Numbers that a scan holds at once; parts are longer in long logs."""
 FIRST_TIME_STEP_S, LAST_TIME_STEP_S = 8.0, 0.2
@@ -232,8 +235,21 @@ def _cross_products(
     every[np.arange(count), :, part] = np.stack(columns, axis=2)
     C = problem.whitening_filter.white(every.reshape(count, -1, parts * p))
     shared = linearisation.slopes.T @ C
-    G = C.T @ C - shared.T @ linearisation.inverse @ shared
+    begun = np.searchsorted(part, np.arange(parts)) * (len(C) // count)
+    G = _products_of_later(C, begun, p) - shared.T @ linearisation.inverse @ shared
     return G.reshape(parts, p, parts, p), (C.T @ linearisation.left).reshape(-1, p)
+
+
+def _products_of_later(C: Floats, begun: Ints, p: int) -> Floats:
+    """Return ``C.T @ C`` of columns that begin one after the other: p of each part, zero in the rows before `begun`."""
+    G = np.empty((C.shape[1], C.shape[1]))
+    edges = np.linspace(0, len(begun), LATER_BLOCKS + 1).astype(int).tolist()
+    for first, end in pairwise(edges):
+        if first < end:
+            own, rows = slice(first * p, end * p), slice(int(begun[first]), None)
+            G[: end * p, own] = C[rows, : end * p].T @ C[rows, own]
+            G[own, : first * p] = G[: first * p, own].T
+    return G
 
 
 def _gains(G: Floats, g: Floats, a: Ints, b: Ints, candidate: Candidate) -> Floats:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ferryid.diagnose.inference import onset_estimation
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, fit, starting_point
 from ferryid.diagnose.inference.folds import block_s
 from ferryid.diagnose.inference.onset_estimation import (
@@ -207,3 +208,11 @@ def test_a_wind_that_gets_up_is_found_with_its_beginning(tmp_path: Path) -> None
     (one,) = found.candidates
     assert (one.onset_s, one.offset_s) == (pytest.approx(210.0, abs=5.0), inf)
     assert found.values[0][:2] == pytest.approx([-3.0, 4.0], abs=0.4)
+
+
+def test_cross_products_of_parts_that_begin_one_after_another_are_those_of_all_rows() -> None:
+    rng = np.random.default_rng(2)
+    for parts, p, rows in ((11, 2, 60), (3, 1, 30), (40, 3, 90)):
+        begun = np.sort(rng.integers(0, rows, parts))
+        C = rng.normal(size=(rows, parts * p)) * (np.arange(rows)[:, None] >= np.repeat(begun, p))
+        np.testing.assert_allclose(onset_estimation._products_of_later(C, begun, p), C.T @ C, rtol=0.0, atol=1e-12)
