@@ -94,7 +94,7 @@ def test_a_size_is_distinct_from_what_looks_alike_beside_any_hull(tmp_path: Path
     known = sizes_in(lag, every, truth_of)
     assert known.distinct > 1.5 * known.oracle
     assert distinctness(lag, every, truth_of(known.distinct)) == pytest.approx(1.0, abs=0.1)
-    assert any(key[0] == "time_delay" for key in every[0].responses)
+    assert any(key[0] == "time_delay" for key in every[0].responses[0])
     # A hull that nobody modelled does more than its 26 coefficients.
     assert every[0].any_hull.shape[1] > every[0].problem.by_hull.shape[1]
     # Kinematics fits all errors of the sensors at once.

@@ -19,7 +19,7 @@ wind of each log. That is the distinct size; the oracle's stays what doses are m
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from math import inf, sqrt
@@ -31,7 +31,7 @@ from scipy.stats import norm
 
 from ferryid.diagnose.data import read_measurements
 from ferryid.diagnose.inference import INFERENCE, EstimationProblem, fit
-from ferryid.diagnose.judging import response_columns
+from ferryid.diagnose.judging import candidates_of, response_columns
 from ferryid.diagnose.judging.motion_evidence import motion_responses
 from ferryid.effects import effects
 from ferryid.types import Floats
@@ -56,6 +56,8 @@ APART = float(2.0 * norm.ppf(RELIABLE))
 
 The log-likelihood ratio is half the square on average, with the length as its standard deviation.
 """
+SMALL = 0.1
+"""Of the usual size of an effect, at which another one is looked at besides."""
 SEARCHED = 4.0
 """How far beyond the largest size of an effect its oracle's is looked for, as a factor."""
 
@@ -82,13 +84,25 @@ class Baseline:
         return np.hstack([slopes, motion_responses(self.problem, fit(self.problem, ()))])
 
     @cached_property
-    def responses(self) -> dict[Key, Floats]:
-        """What every effect does to the whitened prediction errors by each parameter of usual size, shape (w, parameters)."""
-        found, columns = response_columns(self.problem, fit(self.problem, ()))
-        made: dict[Key, list[Floats]] = {}
-        for (key, _), column in zip(found.parameters, columns.T[len(found.hull_spread) :], strict=True):
-            made.setdefault(key, []).append(column)
-        return {key: np.column_stack(every) for key, every in made.items()}
+    def responses(self) -> tuple[dict[Key, Floats], ...]:
+        """What every effect does to them by each parameter of usual size, shape (w, parameters).
+
+        Once as at that size, and once as at `SMALL` of it: a lag of a second does not look like ten of a tenth.
+        """
+        return tuple(_responses(self.problem, share) for share in (1.0, SMALL))
+
+
+def _responses(problem: EstimationProblem, share: float) -> dict[Key, Floats]:
+    """Return what every effect does by a share of its usual size, in whole ones."""
+    some = [
+        replace(one, parameters=tuple(replace(each, size=share * each.size) for each in one.parameters))
+        for one in candidates_of(problem)
+    ]
+    found, columns = response_columns(problem, fit(problem, ()), some)
+    made: dict[Key, list[Floats]] = {}
+    for (key, _), column in zip(found.parameters, columns.T[len(found.hull_spread) :], strict=True):
+        made.setdefault(key, []).append(column / share)
+    return {key: np.column_stack(every) for key, every in made.items()}
 
 
 @dataclass(frozen=True)
@@ -189,8 +203,9 @@ def distinctness(one: Concealment, recording: Sequence[Baseline], truth: Truth) 
     conditions = _conditions(recording, truth)
     alone = _beside(change.white, np.hstack([_of_any_hull(recording), *conditions])) / SIGMAS
     known, beside = [np.vstack([base.problem.by_hull for base in recording]), *conditions], inf
-    for key in {key for base in recording for key in base.responses} - {truth.key}:
-        beside = min(beside, _beside(change.white, np.hstack([*known, _stacked(recording, key)])))
+    for every in zip(*(base.responses for base in recording), strict=True):
+        for key in {key for one in every for key in one} - {truth.key}:
+            beside = min(beside, _beside(change.white, np.hstack([*known, _stacked(recording, every, key)])))
     return min(alone, beside / APART, change.moved / INFERENCE.void_share, _over_least(one, truth))
 
 
@@ -205,7 +220,7 @@ def _conditions(recording: Sequence[Baseline], truth: Truth) -> list[Floats]:
     own = []
     rows = np.cumsum([0, *(len(base.problem.by_hull) for base in recording)])
     for base, first in zip(recording if len(recording) > 1 else (), rows.tolist(), strict=False):
-        for (effect, instance), columns in base.responses.items():
+        for (effect, instance), columns in base.responses[0].items():
             if effects()[effect].of_log and (effect, instance) != truth.key:
                 every = np.zeros((int(rows[-1]), columns.shape[1]))
                 every[first : first + len(columns)] = columns
@@ -213,14 +228,14 @@ def _conditions(recording: Sequence[Baseline], truth: Truth) -> list[Floats]:
     return own
 
 
-def _stacked(recording: Sequence[Baseline], key: Key) -> Floats:
+def _stacked(recording: Sequence[Baseline], responses: Sequence[Mapping[Key, Floats]], key: Key) -> Floats:
     """Return the responses of an effect in all logs, shape (w, parameters); a log in which it does nothing has none."""
-    most = max(base.responses[key].shape[1] for base in recording if key in base.responses)
+    most = max(one[key].shape[1] for one in responses if key in one)
     every = []
-    for base in recording:
+    for base, one in zip(recording, responses, strict=True):
         own = np.zeros((len(base.problem.by_hull), most))
-        if key in base.responses:
-            own[:, : base.responses[key].shape[1]] = base.responses[key]
+        if key in one:
+            own[:, : one[key].shape[1]] = one[key]
         every.append(own)
     return np.vstack(every)
 
