@@ -141,7 +141,9 @@ def _force_claim(
         figures = replace(
             figures,
             sets_in=sets_in(problem, kept, i),
-            beyond_hull=beyond_any_hull(problem, kept, i, library),
+            beyond_hull=beyond_any_hull(
+                problem, kept, i, library, max((one.gain for one in standing.rivals), default=-inf)
+            ),
         )
     return Claim(finding, figures)
 

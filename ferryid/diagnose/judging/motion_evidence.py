@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import inf
 
 import numpy as np
 
@@ -38,11 +39,14 @@ VAGUE = 1e3
 """Standard deviations by which a force of the motion may change the prediction errors, as the length of them all: anything."""
 
 
-def beyond_any_hull(problem: EstimationProblem, kept: Fit, index: int, library: Sequence[Candidate]) -> bool:
+def beyond_any_hull(
+    problem: EstimationProblem, kept: Fit, index: int, library: Sequence[Candidate], nearest: float = -inf
+) -> bool:
     """Return whether a candidate of a fit that acts all along is none of what a hull, however far off, could be.
 
     Its evidence must be `INFERENCE.contrast` times that of any effect, and that of every other effect, whether the fit has it
-    or not; and it must gain the odds of an effect where any force of the motion is free. How strong an actuator is shows by
+    or not; it must be ahead of any other in its place by the odds of an effect, and gain as much where any force of the motion
+    is free. How strong an actuator is shows by
     masses and damping alone, which nobody knows.
 
     Parameters
@@ -51,9 +55,11 @@ def beyond_any_hull(problem: EstimationProblem, kept: Fit, index: int, library: 
         As of `gain_beside_motion`.
     library
         Every candidate.
+    nearest
+        Evidence of the best other candidate in its place over it [nat].
     """
     candidate = kept.candidates[index]
-    if candidate.times or candidate.effect.scales:
+    if candidate.times or candidate.effect.scales or nearest > -INFERENCE.prior_odds:
         return False
     own = [kept.evidence - without(problem, kept, i).evidence for i in range(len(kept.candidates))]
     others = [one for i, one in enumerate(own) if i != index]

@@ -54,9 +54,12 @@ def test_what_is_no_stronger_than_what_else_is_missing_is_not(tmp_path: Path, mo
     for share, beyond in ((4.5, True), (3.5, False)):
         monkeypatch.setattr(motion_evidence, "largest_gain_beside", lambda *_: own / share)  # noqa: B023
         assert beyond_any_hull(case, made, 0, []) == beyond
+    # A rival that is a little less likely may be what acts.
+    monkeypatch.setattr(motion_evidence, "largest_gain_beside", lambda *_: 0.0)
+    assert beyond_any_hull(case, made, 0, [], -8.5)
+    assert not beyond_any_hull(case, made, 0, [], -7.5)
     # What a force of the motion explains as well is one.
     monkeypatch.setattr(motion_evidence, "gain_beside_motion", lambda *_: 7.0)
-    monkeypatch.setattr(motion_evidence, "largest_gain_beside", lambda *_: 0.0)
     assert not beyond_any_hull(case, made, 0, [])
 
 
