@@ -82,6 +82,7 @@ def page(result: Mapping[str, Any], scores: RecordedScores) -> str:
         "multiples": [f"{one:g}" for one in MULTIPLES],
         "by_multiple": _by_multiple(scores),
         "from_twice_distinct": from_twice_distinct(scores.responses),
+        "distinct_by_family": _distinct_by_family(scores),
         "figures": figures(scores),
     }
     return render(
@@ -141,6 +142,16 @@ def _by_multiple(scores: RecordedScores) -> list[tuple[str, ...]]:
         rows += [(f"*{title}*", joined(family, mine)), *((one.effect, one) for one in pooled(mine))]
     shown = [(title, one) for title, one in rows if one.multiples]
     return [(title, *(few(one.at(level)) for level in range(len(MULTIPLES)))) for title, one in shown]
+
+
+def _distinct_by_family(scores: RecordedScores) -> str:
+    """Return how many doses of twice the distinct size and more each family has, and how many were named, as a phrase."""
+    told = []
+    for family, title in FAMILIES.items():
+        share = from_twice_distinct([one for one in scores.responses if concealments()[one.effect].family == family])
+        if share.of:
+            told.append(f"{title.lower()} {share.count}/{share.of}")
+    return ", ".join(told)
 
 
 def _not_made(scores: RecordedScores) -> list[str]:
