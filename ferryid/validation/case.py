@@ -72,6 +72,9 @@ class Case(Record):
         By how many lengths the profile has the first thruster too far forward.
     oracle_size
         Size that an oracle sees, of which `size` is a multiple; 0 where that is not known before the diagnosis.
+    distinct_size
+        Size from which one could name it who is not told which effect it is, nor the form of a hull that nobody modelled; 0
+        where that is not known.
     logs
         How many logs there are, which are a campaign where there are several.
     first_log
@@ -94,6 +97,7 @@ class Case(Record):
     omitted_terms: tuple[str, ...] = ()
     thruster_shift: float = 0.0
     oracle_size: float = 0.0
+    distinct_size: float = 0.0
     logs: int = 1
     first_log: int = 0
 

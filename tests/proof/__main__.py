@@ -22,7 +22,7 @@ from ferryid.validation.page import page
 from ferryid.validation.page_parts import command, few
 from ferryid.validation.recorded.doses import joined, pooled
 from ferryid.validation.recorded.page import page as page_of_recordings
-from ferryid.validation.recorded.scores import RecordedScores
+from ferryid.validation.recorded.scores import RecordedScores, from_twice_distinct
 from ferryid.validation.records import DIAGNOSED
 from ferryid.validation.rival_scores import RivalScores
 from ferryid.validation.scores import Detection, Scores
@@ -153,10 +153,12 @@ class Part:
         scores = RecordedScores.from_json(result["scores"])
         plain = len(scores.unaltered)
         doses = {one.effect: one for one in pooled([each.doses for each in scores.responses])}
-        twice = joined("all", doses.values()).at_twice
+        twice, distinct = joined("all", doses.values()).at_twice, from_twice_distinct(scores.responses)
         said = (
             f"{counted(scores.runs - plain, 'altered recording')} beside {plain} as they were",
-            f"{scores.right.text} of all sizes" + (f"; {twice.text} at twice the oracle's size" if twice.of else ""),
+            f"{scores.right.text} of all sizes"
+            + (f"; {twice.text} at twice the oracle's size" if twice.of else "")
+            + (f"; {distinct.text} from twice the size on from which it is distinct" if distinct.of else ""),
             f"a name neither concealed nor in the recording as it was in {scores.wrong.text}",
             f"{', '.join(one.recording for one in scores.unaltered)}, their records changed so that the effect explains them",
             _sources(result),

@@ -18,7 +18,16 @@ from ferryid.validation.recorded.effects import concealments
 from ferryid.validation.recorded.kinematic_sizes import SIGMAS
 from ferryid.validation.recorded.log import read_log
 from ferryid.validation.recorded.manifest import Recording
-from ferryid.validation.recorded.oracle_size import Baseline, _beside_hull, _gain_of_noise, oracle_size, visibility
+from ferryid.validation.recorded.oracle_size import (
+    APART,
+    Baseline,
+    _beside,
+    _gain_of_noise,
+    distinctness,
+    oracle_size,
+    sizes_in,
+    visibility,
+)
 from ferryid.vessel import load_profile
 from tests.validation.recorded_logs import ferry, zigzag
 
@@ -34,10 +43,10 @@ def test_what_the_hull_takes_up_is_not_seen() -> None:
     hull = 1e3 * rng.standard_normal((200, 3))
     own = rng.standard_normal(200)
     across = own - hull @ np.linalg.lstsq(hull, own, rcond=None)[0]
-    assert _beside_hull(hull @ [1.0, -2.0, 0.5], hull) < 3.0
-    assert _beside_hull(own, hull) == pytest.approx(np.linalg.norm(across), rel=1e-3)
+    assert _beside(hull @ [1.0, -2.0, 0.5], hull) < 3.0
+    assert _beside(own, hull) == pytest.approx(np.linalg.norm(across), rel=1e-3)
     # A hull that is known takes up nothing.
-    assert _beside_hull(own, 0.0 * hull) == pytest.approx(np.linalg.norm(own))
+    assert _beside(own, 0.0 * hull) == pytest.approx(np.linalg.norm(own))
 
 
 def test_noise_of_known_spectrum_gains_by_its_power() -> None:
@@ -65,6 +74,48 @@ def test_the_oracle_just_sees_its_size(effect: str) -> None:
     # Twice as many such logs halve the square of what is needed.
     twice = visibility(one, baseline() * 2, truth_of(size))
     assert twice == pytest.approx(np.sqrt(2.0), abs=0.15)
+
+
+def test_the_true_one_of_two_is_likelier_19_times_in_20() -> None:
+    # The log-likelihood ratio is half the square of what sets them apart, give or take its length.
+    assert norm.sf(0.0, 0.5 * APART**2, APART) == pytest.approx(0.95)
+
+
+@pytest.mark.slow
+def test_a_size_is_distinct_from_what_looks_alike_beside_any_hull(tmp_path: Path) -> None:
+    log = read_log(str(zigzag(tmp_path / "tank.dat", 120.0)), load_profile("kvlcc2-model"))
+    every = [Baseline(log, _Log(log.measurements).trial)]
+    lag = concealments()["thruster_lag"]
+
+    def truth_of(size: float) -> Truth:
+        return lag.sample(size, log, np.random.default_rng(4), (None, None))
+
+    known = sizes_in(lag, every, truth_of)
+    there = distinctness(lag, every, truth_of(known.distinct))
+    assert known.distinct > 1.5 * known.oracle
+    assert there == pytest.approx(1.0, abs=0.1)
+    # A hull that nobody modelled does more than its 26 coefficients.
+    assert every[0].any_hull.shape[1] > every[0].problem.by_hull.shape[1]
+    # Kinematics fits all errors of the sensors at once.
+    arm = concealments()["lever_arm"]
+    seen = sizes_in(arm, baseline(), lambda size: Truth("lever_arm", None, {"x": size, "y": 0.0}))
+    assert seen.distinct == seen.oracle
+
+
+@pytest.mark.slow
+def test_a_short_lag_looks_like_a_delay() -> None:
+    lag, (own,) = concealments()["thruster_lag"], baseline()
+
+    def truth_of(size: float) -> Truth:
+        return lag.sample(size, ferry(), np.random.default_rng(4), (None, None))
+
+    # Where no delay is thought of, it is as distinct as it is visible.
+    others = Baseline(own.log, own.problem)
+    others.__dict__["responses"] = tuple(
+        {key: one for key, one in responses.items() if key[0] != "time_delay"} for responses in own.responses
+    )
+    truth = truth_of(oracle_size(lag, [own], truth_of))
+    assert distinctness(lag, [own], truth) < 0.97 * distinctness(lag, [others], truth)
 
 
 @pytest.mark.slow

@@ -19,7 +19,7 @@ from ferryid.validation.recorded.case_sampling import NotMade
 from ferryid.validation.recorded.evaluators import recorded_pipeline
 from ferryid.validation.recorded.log import read_log
 from ferryid.validation.recorded.page import page
-from ferryid.validation.recorded.scores import recorded_targets, score_recorded
+from ferryid.validation.recorded.scores import from_twice_distinct, recorded_targets, score_recorded
 from ferryid.validation.records import CaseResult, Diagnosis, Finding
 from ferryid.validation.run import render_summary, run_validation
 from ferryid.validation.source_hash import source_hash
@@ -250,6 +250,32 @@ def test_doses_are_counted_by_the_multiple_of_the_oracles_size() -> None:
     assert target.reached is not True
     # Doses without an oracle's size are none of these.
     assert score_recorded([plain([]), case((ARM,), [arm])], []).responses[0].doses.multiples == ()
+
+
+def test_doses_are_counted_by_the_distinct_size() -> None:
+    arm = finding("lever_arm", {"x": 1.1, "y": 0.0}, 0.2)
+    cases = [
+        case((ARM,), found, size=size, oracle_size=0.5, distinct_size=least)
+        for size, found, least in ((1.0, [], 0.8), (1.0, [arm], 0.5), (4.0, [], 0.5), (9.0, [arm], 0.0))
+    ]
+    scores = score_recorded([plain([]), *cases], [])
+    share = from_twice_distinct(scores.responses)
+    assert (share.count, share.of) == (1, 2)
+    (target,) = [one for one in recorded_targets(scores) if "twice the distinct size" in one.what]
+    assert "50.0 % (1/2)" in target.what
+    result = {
+        "settings": {"real": "list.toml", "runs": 1.0, "only": []},
+        "seed": 7,
+        "counts": {"refused": 0, "crashed": 0, "diagnosed": 5},
+        "commitment": "0" * 64,
+    }
+    text = " ".join(page(result, scores).split())
+    assert "Named from twice the distinct size on: 50.0 % (1/2)" in text
+    assert "(sensors 1/2)" in text
+    # Answers of a run before there was one lack it.
+    assert not any(
+        "distinct" in one.what for one in recorded_targets(score_recorded([plain([]), case((ARM,), [arm])], []))
+    )
 
 
 def test_of_a_record_that_is_wrong_altogether_nothing_may_be_named() -> None:

@@ -208,6 +208,12 @@ def _ranked_candidates(
     return sorted([*fair, *found[INFERENCE.compared_candidates :]], key=lambda one: -one.gain)
 
 
+def largest_gain_beside(problem: EstimationProblem, chosen: Fit, library: Sequence[Candidate]) -> float:
+    """Return the evidence that the best further candidate of a library adds to those chosen, 0 where none adds any [nat]."""
+    left = [one for one in library if one.effect.unsteady is None and one.key not in chosen.keys]
+    return max([0.0, *(one.gain for one in _ranked_candidates(problem, chosen, left, ()))])
+
+
 def _with_own_noise(problem: EstimationProblem, one: ScoredCandidate) -> ScoredCandidate:
     made = refit_with_own_noise(problem, fit(problem, one.fit.candidates, one.fit.values))
     return replace(one, fit=made, gain=max(one.gain, one.gain + made.evidence - one.fit.evidence))

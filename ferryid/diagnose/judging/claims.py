@@ -64,6 +64,8 @@ class Figures:
         disturbances could, at its upper end.
     sets_in
         True where it sets in or ends within the log as an event that no hull explains, however far that is off.
+    beyond_hull
+        True where it acts all along and stands out against all that a hull, however far off, or another effect explains.
     doubt
         Why its values are not credible, as the end of a sentence; empty where they are.
     """
@@ -86,6 +88,7 @@ class Figures:
     other_logs: OtherLogs | None = None
     beyond_feedback: bool = False
     sets_in: bool = False
+    beyond_hull: bool = False
     doubt: str = ""
 
 

@@ -282,9 +282,10 @@ def hull_from_this_log(finding: Finding, context: Context, _threshold: float) ->
     """Lower forces where the hull is known from nothing but the log that shows them.
 
     A hull that a campaign's other logs speak for is known as far as forces go; what a disturbance shakes is still guessed at,
-    and may be its measurement. What sets in within the log is known by that: no hull changes from one moment to the next.
+    and may be its measurement. What sets in within the log is known by that: no hull changes from one moment to the next. What
+    acts all along is, where it stands out against every force that the motion decides.
     """
-    if context.own.sets_in:
+    if context.own.sets_in or context.own.beyond_hull:
         return finding, ""
     guessed = {"force": not context.log.joint, "disturbance": True}.get(context.own.kind, False)
     if context.log.hull_known or not guessed:
@@ -524,7 +525,8 @@ def log_notes(log: LogFigures) -> list[str]:
         notes.append(
             "The profile has no hull model, or one of unknown spread: damping and added mass were fitted to this log beside "
             "the findings, which can stand in for what a hull model would explain. Take them as hints, of probability "
-            f"{JUDGING.hint_probability:g} at most, but for what sets in within the log and stands out."
+            f"{JUDGING.hint_probability:g} at most, but for what stands out: what sets in within the log, or what no force "
+            "of the motion explains."
         )
     if drowned := drowned_axes(log, noise_drowns_an_axis.threshold or 0.0):
         shares = " and ".join(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import inf
 from typing import Any
@@ -30,6 +30,7 @@ from ferryid.diagnose.judging.figure_data import figure_columns, figure_regresso
 from ferryid.diagnose.judging.finding import Finding, Rival
 from ferryid.diagnose.judging.held_out import Proof
 from ferryid.diagnose.judging.locate import locate
+from ferryid.diagnose.judging.motion_evidence import beyond_any_hull
 from ferryid.diagnose.judging.onset_evidence import sets_in
 from ferryid.diagnose.judging.time_posterior import TimePosterior
 from ferryid.effects.force_model import Measurements
@@ -41,7 +42,12 @@ SHOWN_RIVALS = 3
 
 
 def force_claims(
-    problem: EstimationProblem, stands: Elimination, measurements: Measurements, *, hull_known: bool
+    problem: EstimationProblem,
+    stands: Elimination,
+    measurements: Measurements,
+    library: Sequence[Candidate] = (),
+    *,
+    hull_known: bool,
 ) -> list[Claim]:
     """Return the findings of forces with their figures, that which removes most of the error first.
 
@@ -53,12 +59,14 @@ def force_claims(
         What is left of the selection.
     measurements
         The log's measurements at its full rate.
+    library
+        Every candidate, against which a force stands out where the hull is not known.
     hull_known
         Whether the hull comes from elsewhere than this log.
     """
     removed = removed_shares(problem, stands)
     claims = [
-        _force_claim(problem, stands, measurements, i, removed.get(one.key, {}), hull_known=hull_known)
+        _force_claim(problem, stands, measurements, i, removed.get(one.key, {}), library, hull_known=hull_known)
         for i, one in enumerate(stands.fit.candidates)
     ]
     return sorted(claims, key=lambda one: -sum(one.finding.improvement.values()))
@@ -70,6 +78,7 @@ def _force_claim(
     measurements: Measurements,
     i: int,
     removed: Mapping[str, float],
+    library: Sequence[Candidate],
     *,
     hull_known: bool,
 ) -> Claim:
@@ -119,7 +128,15 @@ def _force_claim(
     if proof is not None and candidate.effect.id in OUT_OF_STEP:
         beyond = proof.improvement.score_low > feedback_of(problem, kept).high
         figures = replace(figures, beyond_feedback=beyond)
-    return Claim(finding, figures if hull_known else replace(figures, sets_in=sets_in(problem, kept, i)))
+    if not hull_known:
+        figures = replace(
+            figures,
+            sets_in=sets_in(problem, kept, i),
+            beyond_hull=beyond_any_hull(
+                problem, kept, i, library, max((one.gain for one in standing.rivals), default=-inf)
+            ),
+        )
+    return Claim(finding, figures)
 
 
 def _mean_squares(proof: Proof) -> tuple[Mapping[str, float], Mapping[str, float]]:

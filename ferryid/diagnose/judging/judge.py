@@ -75,13 +75,15 @@ def _judged(
     unknown = find_unexplained(problem, stands.fit, measurements, laws)
     explained = over(lambda state: explained_by(log, stands.fit, state), states)
     progress("locating")
+    baseline = log.estimated.baseline
+    # Beside the hull of other logs, forces need not stand out against the whole library.
+    library = () if baseline.joint else log.steady
     claims = (
         *sensor_claims(log.estimated.averaged.screened),
-        *force_claims(problem, stands, measurements, hull_known=log.estimated.baseline.hull_known),
+        *force_claims(problem, stands, measurements, library, hull_known=baseline.hull_known),
         *disturbance_claims(problem, stands.fit, states, measurements, explained),
         *unknown.claims,
     )
-    baseline = log.estimated.baseline
     figures = LogFigures(
         hull_known=baseline.hull_known,
         joint=baseline.joint,

@@ -19,7 +19,7 @@ from ferryid.validation.case_sampling import LEVELS, check_runs, numbered
 from ferryid.validation.recorded.effects import Concealed, Concealment, concealments
 from ferryid.validation.recorded.log import RecordedLog, cached_log
 from ferryid.validation.recorded.manifest import Recording
-from ferryid.validation.recorded.oracle_size import baselines, oracle_size
+from ferryid.validation.recorded.oracle_size import baselines, oracle_size, sizes_in
 
 KINDS = ("clean", "single", "span", "pair", "gross")
 """Kinds of cells: recordings as they are, one effect all along, one that begins within the recording, two together, and records
@@ -275,14 +275,15 @@ def _drawn(
         multiple = float(np.exp(rng.uniform(*np.log(LARGE))))
     begin = None if kind == "single" else float(rng.uniform(*LATER)) * logs[0].duration_s
     truth_of = _truth_of(logs, one, rng, begin)
-    least = oracle_size(one, baselines(recording.logs, recording.vessel), truth_of)
+    known = sizes_in(one, baselines(recording.logs, recording.vessel), truth_of)
+    least = known.oracle
     size, most = multiple * least, one.sizes(logs[0])[1]
     if size > most:
         seen = "an oracle sees none" if isinf(least) else f"an oracle needs {least:.3g} {one.unit}"
         text = f"{one.id} of {multiple:.2g} times the oracle's size was not made in {recording.name}: {seen},"
         return NotMade(recording.name, one.id, 0.0, f"{text} and sizes end at {most:.3g} {one.unit}.")
     case = _case(recording, logs, one.id, kind, rng, truth_of(size), level if kind == "single" else None, size)
-    return replace(case, oracle_size=least, allowed=one.allowed)
+    return replace(case, oracle_size=least, distinct_size=known.distinct, allowed=one.allowed)
 
 
 def _case(

@@ -8,27 +8,40 @@ Sensors that err are seen in kinematics likewise, by the standard error of their
 
 What moves the vessel less than a diagnosis reports is nothing that it is asked for: the size is at least so large. Doses are
 multiples of it.
+
+A diagnosis is not told the effect. The best that could be made of a recording by one who is not has the same evidence for the
+effect over none, and beside it for the effect over each other one of the library, whose parameters it fits as well: a delay of
+a tenth of a second does what a lag of a tenth of a second does. The effect is the likelier of two in `RELIABLE` of the logs
+where what the other leaves of its deviation is `APART` long. Nor is such a one told what form the hull has that nobody
+modelled: the evidence over none is what is left where any force of the motion is free, and in a campaign the current and the
+wind of each log. That is the distinct size; the oracle's stays what doses are multiples of.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache, cached_property
 from math import inf, sqrt
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+from scipy.stats import norm
 
 from ferryid.diagnose.data import read_measurements
-from ferryid.diagnose.inference import INFERENCE, EstimationProblem
+from ferryid.diagnose.inference import INFERENCE, EstimationProblem, fit
+from ferryid.diagnose.judging import candidates_of, response_columns
+from ferryid.diagnose.judging.motion_evidence import motion_responses
 from ferryid.effects import effects
 from ferryid.types import Floats
 from ferryid.validation.case import Truth
+from ferryid.validation.detection_curves import RELIABLE
 from ferryid.validation.recorded.effects.effect import Concealment
 from ferryid.validation.recorded.kinematic_sizes import SIGMAS
 from ferryid.validation.recorded.log import RecordedLog, cached_log, cached_problem
 from ferryid.validation.recorded.writing import write_log
+from ferryid.validation.records import Key
 
 ROUNDS = 6
 """Of the search for a size."""
@@ -38,6 +51,13 @@ FURTHEST = 30.0
 """Factor by which a step of the search changes the size at most."""
 SMOOTHED = 9
 """Frequencies over which a spectrum is averaged."""
+APART = float(2.0 * norm.ppf(RELIABLE))
+"""Length of what another effect leaves of a deviation where the true one is the likelier of the two 19 times in 20.
+
+The log-likelihood ratio is half the square on average, with the length as its standard deviation.
+"""
+SMALL = 0.1
+"""Of the usual size of an effect, at which another one is looked at besides."""
 SEARCHED = 4.0
 """How far beyond the largest size of an effect its oracle's is looked for, as a factor."""
 
@@ -55,13 +75,78 @@ class Baseline:
     log: RecordedLog
     problem: EstimationProblem
 
+    @cached_property
+    def any_hull(self) -> Floats:
+        """What the hull does to them within its prior, shape (w, n); of one that nobody modelled, any force of the motion."""
+        slopes = self.problem.by_hull
+        if self.log.profile.hull.is_known:
+            return slopes
+        return np.hstack([slopes, motion_responses(self.problem, fit(self.problem, ()))])
+
+    @cached_property
+    def responses(self) -> tuple[dict[Key, Floats], ...]:
+        """What every effect does to them by each parameter of usual size, shape (w, parameters).
+
+        Once as at that size, and once as at `SMALL` of it: a lag of a second does not look like ten of a tenth.
+        """
+        return tuple(_responses(self.problem, share) for share in (1.0, SMALL))
+
+
+def _responses(problem: EstimationProblem, share: float) -> dict[Key, Floats]:
+    """Return what every effect does by a share of its usual size, in whole ones."""
+    some = [
+        replace(one, parameters=tuple(replace(each, size=share * each.size) for each in one.parameters))
+        for one in candidates_of(problem)
+    ]
+    found, columns = response_columns(problem, fit(problem, ()), some)
+    made: dict[Key, list[Floats]] = {}
+    for (key, _), column in zip(found.parameters, columns.T[len(found.hull_spread) :], strict=True):
+        made.setdefault(key, []).append(column / share)
+    return {key: np.column_stack(every) for key, every in made.items()}
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Sizes of an effect in a recording.
+
+    Attributes
+    ----------
+    oracle
+        That the oracle names 19 times in 20; infinite where it is beyond all that is concealed.
+    distinct
+        From which one could who is not told which effect it is; where nobody could, as far as was looked.
+    """
+
+    oracle: float
+    distinct: float
+
+
+@cache
+def cached_baseline(path: str, vessel: str) -> Baseline:
+    """Return a log of a recording, whose responses are made once in a process."""
+    return Baseline(cached_log(path, vessel), cached_problem(path, vessel))
+
 
 def baselines(logs: Sequence[str], vessel: str) -> list[Baseline]:
     """Return the logs of a recording, read once in a process."""
-    return [Baseline(cached_log(path, vessel), cached_problem(path, vessel)) for path in logs]
+    return [cached_baseline(path, vessel) for path in logs]
 
 
-def oracle_size(one: Concealment, recording: Sequence[Baseline], truth_of: Callable[[float], Truth]) -> float:
+def sizes_in(one: Concealment, recording: Sequence[Baseline], truth_of: Callable[[float], Truth]) -> Sizes:
+    """Return the oracle's size of an effect, and that from which it is distinct from all others."""
+    least = oracle_size(one, recording, truth_of)
+    kinematic = any(one.visible is not None and one.visible(base.log) is not None for base in recording)
+    # Kinematics is fitted with all errors of the sensors at once.
+    distinct = least if kinematic else max(least, oracle_size(one, recording, truth_of, distinctness))
+    return Sizes(least, min(distinct, SEARCHED * one.sizes(recording[0].log)[1]))
+
+
+def oracle_size(
+    one: Concealment,
+    recording: Sequence[Baseline],
+    truth_of: Callable[[float], Truth],
+    seen_as: Callable[[Concealment, Sequence[Baseline], Truth], float] | None = None,
+) -> float:
     """Return the size of an effect that the oracle names 19 times in 20; infinite where it is beyond all that is concealed.
 
     Parameters
@@ -72,14 +157,17 @@ def oracle_size(one: Concealment, recording: Sequence[Baseline], truth_of: Calla
         Its logs, which are a campaign where there are several.
     truth_of
         Returns the truth of a size, all else the same.
+    seen_as
+        How far a truth is beyond what is seen, 1 where it just is; `visibility` where None.
     """
+    seen_as = seen_as or visibility
     measured = [] if one.visible is None else [one.visible(base.log) for base in recording]
     if seen_there := [size for size in measured if size is not None]:
         return min(seen_there)
     least, most = one.sizes(recording[0].log)
     size, power, before = sqrt(least * most), 1.0, (0.0, 0.0)
     for _ in range(ROUNDS):
-        seen = visibility(one, recording, truth_of(size))
+        seen = seen_as(one, recording, truth_of(size))
         if abs(seen - 1.0) < CLOSE:
             break
         if before[1] > 0.0 and seen > 0.0 and size != before[0]:
@@ -98,9 +186,85 @@ def visibility(one: Concealment, recording: Sequence[Baseline], truth: Truth) ->
     It is the smaller of two ratios: of the deviation in standard deviations to `SIGMAS`, and of what the vessel moves by it, or
     of its parameter, to the least that a diagnosis reports.
     """
-    changed, hull, moved = list[Floats](), list[Floats](), 0.0
+    change = _change(one, recording, truth)
+    hull = np.vstack([base.problem.by_hull for base in recording])
+    deviation = sqrt(2.0 * change.gain) if change.unsteady else _beside(change.white, hull)
+    return min(deviation / SIGMAS, change.moved / INFERENCE.void_share, _over_least(one, truth))
+
+
+def distinctness(one: Concealment, recording: Sequence[Baseline], truth: Truth) -> float:
+    """Return how far an effect is beyond what one sees who is not told which it is, 1 where it just shows.
+
+    Of a random push the spectrum alone is known, which no other effect has: it is as distinct as it is visible.
+    """
+    change = _change(one, recording, truth)
+    if change.unsteady:
+        return visibility(one, recording, truth)
+    conditions = _conditions(recording, truth)
+    alone = _beside(change.white, np.hstack([_of_any_hull(recording), *conditions])) / SIGMAS
+    known, beside = [np.vstack([base.problem.by_hull for base in recording]), *conditions], inf
+    for every in zip(*(base.responses for base in recording), strict=True):
+        for key in {key for one in every for key in one} - {truth.key}:
+            beside = min(beside, _beside(change.white, np.hstack([*known, _stacked(recording, every, key)])))
+    return min(alone, beside / APART, change.moved / INFERENCE.void_share, _over_least(one, truth))
+
+
+def _of_any_hull(recording: Sequence[Baseline]) -> Floats:
+    """Return what a hull of any form does in all logs; forces that one has no motion for do nothing there."""
+    most = max(base.any_hull.shape[1] for base in recording)
+    return np.vstack([np.pad(base.any_hull, ((0, 0), (0, most - base.any_hull.shape[1]))) for base in recording])
+
+
+def _conditions(recording: Sequence[Baseline], truth: Truth) -> list[Floats]:
+    """Return the responses of conditions that each log of a campaign has of its own, every log's in columns of its own."""
+    own = []
+    rows = np.cumsum([0, *(len(base.problem.by_hull) for base in recording)])
+    for base, first in zip(recording if len(recording) > 1 else (), rows.tolist(), strict=False):
+        for (effect, instance), columns in base.responses[0].items():
+            if effects()[effect].of_log and (effect, instance) != truth.key:
+                every = np.zeros((int(rows[-1]), columns.shape[1]))
+                every[first : first + len(columns)] = columns
+                own.append(every)
+    return own
+
+
+def _stacked(recording: Sequence[Baseline], responses: Sequence[Mapping[Key, Floats]], key: Key) -> Floats:
+    """Return the responses of an effect in all logs, shape (w, parameters); a log in which it does nothing has none."""
+    most = max(one[key].shape[1] for one in responses if key in one)
+    every = []
+    for base, one in zip(recording, responses, strict=True):
+        own = np.zeros((len(base.problem.by_hull), most))
+        if key in one:
+            own[:, : one[key].shape[1]] = one[key]
+        every.append(own)
+    return np.vstack(every)
+
+
+@dataclass(frozen=True)
+class _Change:
+    """What an effect changes in a recording.
+
+    Attributes
+    ----------
+    white
+        Of the whitened prediction errors of all logs, shape (w,).
+    gain
+        Expected log-likelihood ratio of a random push, else 0.
+    moved
+        Acceleration by it over the measured one, of the channel where that is most.
+    unsteady
+        Whether it is a random push.
+    """
+
+    white: Floats
+    gain: float
+    moved: float
+    unsteady: bool
+
+
+def _change(one: Concealment, recording: Sequence[Baseline], truth: Truth) -> _Change:
+    changed, moved, gain = list[Floats](), 0.0, 0.0
     unsteady = truth.effect in effects() and effects()[truth.effect].unsteady is not None
-    gain = 0.0
     for base in recording:
         problem, as_it_was = base.problem, base.problem.plain
         if one.altered is not None:
@@ -113,13 +277,11 @@ def visibility(one: Concealment, recording: Sequence[Baseline], truth: Truth) ->
         white = problem.whitening_filter.white(by_step)
         gain += _gain_of_noise(white.reshape(by_step.shape)) if unsteady else 0.0
         changed.append(white)
-        hull.append(problem.by_hull)
         windows = problem.windows
         by_window = windows.gap(altered) - windows.gap(as_it_was)
         usual = np.sqrt(np.mean(windows.measured[:, windows.channels] ** 2, axis=0))
         moved = max(moved, float((np.sqrt(np.mean(by_window**2, axis=0)) / np.maximum(usual, 1e-12)).max()))
-    deviation = sqrt(2.0 * gain) if unsteady else _beside_hull(np.concatenate(changed), np.vstack(hull))
-    return min(deviation / SIGMAS, moved / INFERENCE.void_share, _over_least(one, truth))
+    return _Change(np.concatenate(changed), gain, moved, unsteady)
 
 
 def _parts(one: Concealment, log: RecordedLog, truth: Truth) -> Floats:
@@ -143,10 +305,10 @@ def resampled(parts: Floats, t: Floats, at: Floats) -> Floats:
     return np.column_stack([np.interp(at, t, one) for one in flat.T]).reshape(len(at), *parts.shape[1:])
 
 
-def _beside_hull(changed: Floats, hull: Floats) -> float:
-    """Return the length of whitened changes, shape (w,), less what the hull takes up within its prior; slopes shape (w, 26)."""
-    across = hull.T @ changed
-    taken = across @ np.linalg.solve(hull.T @ hull + np.eye(hull.shape[1]), across)
+def _beside(changed: Floats, slopes: Floats) -> float:
+    """Return the length of whitened changes, shape (w,), less what others take up within their prior; slopes shape (w, n)."""
+    across = slopes.T @ changed
+    taken = across @ np.linalg.solve(slopes.T @ slopes + np.eye(slopes.shape[1]), across)
     return sqrt(max(float(changed @ changed - taken), 0.0))
 
 

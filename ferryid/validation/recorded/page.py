@@ -14,7 +14,15 @@ from ferryid.validation.page_parts import BEYOND, answers, error_figure, error_r
 from ferryid.validation.recorded.case_sampling import MULTIPLES, NotMade
 from ferryid.validation.recorded.doses import RELATIVE_STEP, Doses, joined, pooled
 from ferryid.validation.recorded.effects import ACTUATOR, LOAD, SENSOR, concealments
-from ferryid.validation.recorded.scores import DoseResponse, Later, Moved, Paired, RecordedScores, recorded_targets
+from ferryid.validation.recorded.scores import (
+    DoseResponse,
+    Later,
+    Moved,
+    Paired,
+    RecordedScores,
+    from_twice_distinct,
+    recorded_targets,
+)
 
 FAMILIES = {SENSOR: "Sensors", ACTUATOR: "Actuators", LOAD: "Loads"}
 
@@ -73,6 +81,8 @@ def page(result: Mapping[str, Any], scores: RecordedScores) -> str:
         "by_family": _by_family(scores),
         "multiples": [f"{one:g}" for one in MULTIPLES],
         "by_multiple": _by_multiple(scores),
+        "from_twice_distinct": from_twice_distinct(scores.responses),
+        "distinct_by_family": _distinct_by_family(scores),
         "figures": figures(scores),
     }
     return render(
@@ -83,11 +93,13 @@ def page(result: Mapping[str, Any], scores: RecordedScores) -> str:
 def _row(one: DoseResponse) -> tuple[str, ...]:
     unit = concealments()[one.effect].unit
     if one.curve is None or one.noticed_curve is None:
-        return one.effect, one.recording, unit, "", "", "", "", "the recording as it was has this name"
+        return one.effect, one.recording, unit, "", "", "", "", "", "the recording as it was has this name"
     note = ", ".join(f"{count} {what}" for what, count in one.instead.items())
     named = f"{sum(one.named)} of {len(one.named)}"
-    least = f"{float(np.median(one.oracle_sizes)):.3g}" if any(one.oracle_sizes) else ""
-    return one.effect, one.recording, unit, least, named, one.curve.text, one.noticed_curve.text, note
+    least, distinct = (
+        f"{float(np.median(some)):.3g}" if any(some) else "" for some in (one.oracle_sizes, one.distinct_sizes)
+    )
+    return one.effect, one.recording, unit, least, distinct, named, one.curve.text, one.noticed_curve.text, note
 
 
 def _later(one: Later) -> tuple[str, ...]:
@@ -130,6 +142,16 @@ def _by_multiple(scores: RecordedScores) -> list[tuple[str, ...]]:
         rows += [(f"*{title}*", joined(family, mine)), *((one.effect, one) for one in pooled(mine))]
     shown = [(title, one) for title, one in rows if one.multiples]
     return [(title, *(few(one.at(level)) for level in range(len(MULTIPLES)))) for title, one in shown]
+
+
+def _distinct_by_family(scores: RecordedScores) -> str:
+    """Return how many doses of twice the distinct size and more each family has, and how many were named, as a phrase."""
+    told = []
+    for family, title in FAMILIES.items():
+        share = from_twice_distinct([one for one in scores.responses if concealments()[one.effect].family == family])
+        if share.of:
+            told.append(f"{title.lower()} {share.count}/{share.of}")
+    return ", ".join(told)
 
 
 def _not_made(scores: RecordedScores) -> list[str]:

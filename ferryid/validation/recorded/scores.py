@@ -23,6 +23,8 @@ from ferryid.validation.targets import COVERED, FALSE, IN_TIME, Target, share_ta
 
 AT_TWICE = 0.9
 """Share of doses of twice the oracle's size that is to be named."""
+TWICE_DISTINCT = 2.0
+"""Of the distinct size, from which on nine in ten ought to be named, too."""
 GROSS = "gross"
 """Kind of the cases whose record is wrong altogether."""
 MEDIAN_ERROR = 0.05
@@ -65,6 +67,8 @@ class DoseResponse(Record):
         Of every case: its size, whether it was named, and whether it was named or a hint that the recording had not before.
     oracle_sizes
         Sizes that an oracle sees of the same, all else as in the case.
+    distinct_sizes
+        Sizes from which one could name them who is not told which effect it is.
     curve, noticed_curve
         Detection curves of both; None where there is no case.
     instead
@@ -81,6 +85,14 @@ class DoseResponse(Record):
     noticed_curve: Curve | None
     instead: Mapping[str, int]
     oracle_sizes: tuple[float, ...] = ()
+    distinct_sizes: tuple[float, ...] = ()
+
+    @property
+    def from_twice_distinct(self) -> Share:
+        """Share that was named of sizes of twice the distinct one and more."""
+        known = zip(self.sizes, self.distinct_sizes, self.named, strict=False)
+        flags = [named for size, least, named in known if least and size >= TWICE_DISTINCT * least]
+        return Share(sum(flags), len(flags))
 
     @property
     def doses(self) -> Doses:
@@ -338,15 +350,33 @@ def label(key: Key) -> str:
     return key[0] if key[1] is None else f"{key[0]} ({key[1]})"
 
 
+def from_twice_distinct(responses: Sequence[DoseResponse]) -> Share:
+    """Return the share of all doses of twice the distinct size and more that was named."""
+    every = [one.from_twice_distinct for one in responses]
+    return Share(sum(one.count for one in every), sum(one.of for one in every))
+
+
 def recorded_targets(scores: RecordedScores) -> list[Target]:
     """Return every target."""
     every = scores.recoveries[0]
     small = f"median relative error of parameters: at most {100.0 * MEDIAN_ERROR:.0f} %"
     error = every.median_error
     twice = joined("all", (one.doses for one in scores.responses)).at_twice
+    distinct = from_twice_distinct(scores.responses)
     return [
         share_target(
             f"named rightly at twice the oracle's size: at least {100.0 * AT_TWICE:.0f} %", twice, at_least=AT_TWICE
+        ),
+        *(
+            [
+                share_target(
+                    f"named rightly from twice the distinct size on: at least {100.0 * AT_TWICE:.0f} %",
+                    distinct,
+                    at_least=AT_TWICE,
+                )
+            ]
+            if distinct.of
+            else []
         ),
         share_target(
             f"cases with a name that is neither concealed nor in the recording: at most {100.0 * FALSE:.0f} %",
@@ -413,6 +443,7 @@ def _response(effect: str, recording: str, results: Sequence[CaseResult], plain:
         curve(sizes, noticed) if fresh else None,
         dict(lost.most_common()),
         tuple(one.case.oracle_size for one in fresh),
+        tuple(one.case.distinct_size for one in fresh),
     )
 
 

@@ -260,6 +260,7 @@ def test_a_force_is_a_hint_where_only_the_log_itself_tells_of_the_hull(
     figures = LogFigures(hull_known=known, joint=joint)
     assert stands(hull_from_this_log, found("wind"), Context(Figures(kind), figures)) == sure
     assert stands(hull_from_this_log, found("wind"), Context(Figures(kind, sets_in=True), figures))
+    assert stands(hull_from_this_log, found("wind"), Context(Figures(kind, beyond_hull=True), figures))
     judged, _ = hull_from_this_log(found("wind", 0.2), Context(Figures("force"), LogFigures(hull_known=False)))
     assert judged is not None
     assert judged.probability == 0.2
