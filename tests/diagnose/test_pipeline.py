@@ -81,8 +81,9 @@ def test_a_thruster_that_gives_up_half_way_and_a_breeze(tmp_path: Path) -> None:
     assert fault.parameters["factor"].value == pytest.approx(0.6, abs=0.02)
     onset = fault.parameters["onset"]
     assert onset.low - 1.0 <= 240.0 <= onset.high + 1.0
-    assert wind.parameters["north"].value == pytest.approx(0.6, abs=0.1)
-    assert wind.parameters["east"].value == pytest.approx(-0.4, abs=0.1)
+    for name, value in (("north", 0.6), ("east", -0.4)):
+        assert wind.parameters[name].low <= value <= wind.parameters[name].high
+        assert wind.parameters[name].value == pytest.approx(value, abs=0.15)
     assert min(fault.probability, wind.probability) > 0.95
     assert fault.improvement["yaw"] > 0.8
     assert result.after["mse"]["yaw"] < 0.2 * result.before["mse"]["yaw"]
