@@ -22,7 +22,7 @@ def main() -> None:
     parser.add_argument("--vessels", type=int, default=20, help="simulated vessels")
     count = parser.parse_args().vessels
     with ProcessPoolExecutor(2, get_context("spawn")) as pool:
-        found = list(pool.map(study, (*range(count), *range(FRESH, FRESH + (count + 1) // 2))))
+        found = list(pool.map(study, (*range(count), *range(FRESH, FRESH + count))))
     page = REPORTS / "plan.md"
     page.write_text(written(found[:count], found[count:]), encoding="utf-8")
     stamp(page)
