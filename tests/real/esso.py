@@ -227,7 +227,8 @@ def acting(candidate: Candidate, heading: Callable[[Floats], Floats]) -> Candida
         other = turned(candidate, heading(force_model.measurements.psi))
         return other.effect.apply(force_model, p, instance)
 
-    return replace(candidate, effect=replace(candidate.effect, apply=apply))
+    # The heading is that of all rows of one log.
+    return replace(candidate, effect=replace(candidate.effect, apply=apply, by_row=False))
 
 
 def gain_of(campaign: Campaign, winds: list[Floats], factors: Floats, test: ConditionTest) -> Gain:
