@@ -17,11 +17,11 @@ from ferryid.diagnose.inference.campaign import assemble
 from ferryid.diagnose.inference.campaign_estimation import estimate_campaign
 from ferryid.diagnose.inference.campaign_logs import Member
 from ferryid.diagnose.inference.campaign_model import Campaign
-from ferryid.diagnose.inference.estimation import Candidate
+from ferryid.diagnose.inference.candidate import Candidate, OtherHeading
 from ferryid.diagnose.inference.stages import AveragedLog
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.campaign_conditions import ConditionTest, JudgedConditions, judge_conditions
-from ferryid.diagnose.judging.campaign_evidence import EXCHANGED, MIRRORED, Gain, held_out_loss, turned
+from ferryid.diagnose.judging.campaign_evidence import EXCHANGED, MIRRORED, Gain, held_out_loss
 from ferryid.effects.force_model import ForceModel
 from ferryid.types import no_progress
 from ferryid.vessel import load_profile
@@ -224,8 +224,8 @@ def acting(candidate: Candidate, heading: Callable[[Floats], Floats]) -> Candida
     """Return a condition that acts as if the vessel's heading were another, made from what it is, shape (n,) each."""
 
     def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
-        other = turned(candidate, heading(force_model.measurements.psi))
-        return other.effect.apply(force_model, p, instance)
+        other = OtherHeading(heading(force_model.measurements.psi))
+        return other.acted(lambda turned: candidate.effect.apply(turned, p, instance), force_model)
 
     # The heading is that of all rows of one log.
     return replace(candidate, effect=replace(candidate.effect, apply=apply, by_row=False))
