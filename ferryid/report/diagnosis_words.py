@@ -322,17 +322,20 @@ def summary(diagnoses: Sequence[Diagnosis]) -> str:
     ]
     every = [finding for one in diagnoses for finding in one.findings]
     named = [one for one in every if one.effect != UNKNOWN]
-    sure = list(dict.fromkeys(_sure_name(one) for one in named if one.sure))
+    sure = list(dict.fromkeys(_sure_name(one) for one in named if one.sure and one.effect in effects()))
+    sensors = dict.fromkeys(_sure_name(one) for one in named if one.sure and one.effect not in effects())
     doubtful = dict.fromkeys(_inline(title(one.effect, one.instance)) for one in named if not one.sure)
     known = {_inline(name) for one in named if one.sure for name in _called(one)}
     perhaps = [one for one in doubtful if one not in known]
     parts = [f"Of {counted(len(diagnoses), 'log')}, {listed(counts)}."]
     if sure:
         parts.append(f"The model left out {listed(sure)}.")
+    if sensors:
+        parts.append(f"The sensors have faults, corrected here: {listed(list(sensors))}.")
     if perhaps:
-        parts.append(f"Perhaps it {'also ' if sure else ''}left out {listed(perhaps)}.")
+        parts.append(f"Perhaps the model {'also ' if sure else ''}left out {listed(perhaps)}.")
     if len(named) < len(every):
-        parts.append("More is missing, which nothing known here explains.")
+        parts.append(f"{'More' if named else 'Something'} is missing, which nothing known here explains.")
     return " ".join(filter(None, (*parts, copies(diagnoses))))
 
 

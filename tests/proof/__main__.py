@@ -158,7 +158,9 @@ class Part:
             f"{counted(scores.runs - plain, 'altered recording')} beside {plain} as they were",
             f"{scores.right.text} of all sizes"
             + (f"; {twice.text} at twice the oracle's size" if twice.of else "")
-            + (f"; {distinct.text} from twice the size on at which no other effect does as well" if distinct.of else ""),
+            + (
+                f"; {distinct.text} from twice the size on at which no other effect does as well" if distinct.of else ""
+            ),
             f"a name neither concealed nor in the recording as it was in {scores.wrong.text}",
             f"{', '.join(one.recording for one in scores.unaltered)}, their records changed so that the effect explains them",
             _sources(result),

@@ -33,6 +33,8 @@ class SensorFinding:
         True for what all logs of a campaign show together: see `ferryid.diagnose.checks.pooling`.
     doubt
         Why it is not credible beside other logs, as the end of a sentence; empty where it is.
+    intervals
+        When it acts, as (first, last) [s]; empty where it acts throughout.
     """
 
     effect: str
@@ -43,6 +45,7 @@ class SensorFinding:
     probability: float = 1.0
     vessel: bool = False
     doubt: str = ""
+    intervals: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True)

@@ -66,6 +66,9 @@ def find(measurements: Measurements) -> SensorFinding | None:
             "surge_mps": measurements.nu[:, 0],
             "recorded_N": measurements.parts.sum(axis=1)[:, 0],
         },
+        intervals=tuple(
+            (float(measurements.t[first]), float(measurements.t[end - 1])) for first, end in _stretches(rows)
+        ),
     )
 
 

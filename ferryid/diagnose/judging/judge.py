@@ -107,7 +107,7 @@ def sensor_claims(log: ScreenedLog) -> tuple[Claim, ...]:
                 probability=one.probability,
                 parameters=one.parameters,
                 axes=dict.fromkeys(AXES, 0.0),
-                intervals=(),
+                intervals=one.intervals,
                 says=one.says,
                 vessel=one.vessel,
             ),

@@ -49,6 +49,7 @@ def test_a_vessel_that_speeds_up_with_idle_actuators_was_driven_by_something_els
     assert finding.effect == "unrecorded_force"
     assert finding.parameters["duration"].value == pytest.approx(30.0)
     assert finding.parameters["force"].value == pytest.approx(FERRY.hull.mass_kg * 0.3, rel=0.02)
+    assert finding.intervals == ((pytest.approx(60.0), pytest.approx(89.9)),)
     assert not finding.correct(run(ramp)).usable[600:].any()
     assert finding.correct(run(ramp)).usable[:600].all()
 

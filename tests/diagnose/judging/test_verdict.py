@@ -15,6 +15,7 @@ from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.diagnose.judging.finding import UNKNOWN, Finding
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.judging.verdict import VERDICTS, Remainder, campaign_verdict, verdict_of, worse_axes
+from ferryid.effects import effects
 from ferryid.report.diagnosis_words import headline, summary, title
 from ferryid.types import AXES
 from tests.diagnose.judging.findings import found
@@ -166,7 +167,8 @@ def test_no_sentence_on_several_logs_contradicts_them(logs: list[Diagnosis]) -> 
     every = [finding for one in logs for finding in one.findings]
     named = [one for one in every if one.sure and one.effect != UNKNOWN]
     assert (verdict in ("explained", "partly_explained")) == bool(named)
-    assert ("The model left out" in says) == bool(named)
+    assert ("The model left out" in says) == any(one.effect in effects() for one in named)
+    assert ("The sensors have faults" in says) == any(one.effect not in effects() for one in named)
     if verdict == "explained":
         assert {one.verdict for one in logs} <= {"explained", "matched", "not_testable"}
     for name, hints in ((title(one.effect), not one.sure) for one in every if one.effect != UNKNOWN):
@@ -202,9 +204,14 @@ def test_hints_of_several_logs_are_told_as_hints() -> None:
         for name, findings in (("a", (SURE,)), ("b", (HINT, replace(HINT, effect="waves"), NAMELESS)))
     ]
     assert summary(logs) == (
-        "Of 2 logs, 1 explained and 1 unexplained. The model left out steady wind or current. Perhaps it also left out waves. "
-        "More is missing, which nothing known here explains."
+        "Of 2 logs, 1 explained and 1 unexplained. The model left out steady wind or current. Perhaps the model also left out "
+        "waves. More is missing, which nothing known here explains."
     )
+
+
+def test_where_no_log_has_a_name_something_is_missing_and_not_more() -> None:
+    logs = [Diagnosis(name, "ferry", verdict_of((NAMELESS,), Remainder()), (NAMELESS,), {}, {}) for name in "ab"]
+    assert summary(logs) == "Of 2 logs, 2 unexplained. Something is missing, which nothing known here explains."
 
 
 def test_enumerated_figures_never_explain_what_they_leave() -> None:
