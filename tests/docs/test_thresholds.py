@@ -44,7 +44,7 @@ NO_DECISION = {
         diagnose.second_sources.fit SCALE ANGLE X Y LATE BIAS BIAS_2 NEUTRAL OF_VECTORS OF_SCALARS FLOORS
         diagnose.second_sources.pairs NORTH EAST PSI U V R
         diagnose.inference.kalman CHANNEL_STATES DIFFUSE
-        diagnose.judging.motion_evidence VAGUE
+        diagnose.inference.motion_responses VAGUE
         effects.effect HELD
         effects.equations_of_motion MASSES DAMPED PRODUCTS PRODUCT_OF AHEAD
         effects.force_model _NO_FLOW _NO_LOAD _NO_FACTOR _ONE_WIND

@@ -17,12 +17,10 @@ Frisch and Waugh (1933), Partial time regressions as compared with individual tr
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from math import inf
 
 import numpy as np
 
-from ferryid.diagnose.inference.candidate_terms import terms_of
 from ferryid.diagnose.inference.estimation import (
     Candidate,
     EstimationProblem,
@@ -31,12 +29,9 @@ from ferryid.diagnose.inference.estimation import (
     fitted_force_model,
     without,
 )
+from ferryid.diagnose.inference.motion_responses import motion_responses
 from ferryid.diagnose.inference.search import largest_gain_beside
 from ferryid.diagnose.inference.thresholds import INFERENCE
-from ferryid.types import AXES, Floats
-
-VAGUE = 1e3
-"""Standard deviations by which a force of the motion may change the prediction errors, as the length of them all: anything."""
 
 
 def beyond_any_hull(
@@ -99,20 +94,3 @@ def _left(problem: EstimationProblem, made: Fit) -> float:
     departed = np.concatenate([of_hull, (values - neutral) / size, np.zeros(of_motion.shape[1])])
     step = -np.linalg.solve(slopes.T @ slopes + np.eye(len(departed)), slopes.T @ errors + departed)
     return float(np.sum((errors + slopes @ step) ** 2) + np.sum((departed + step) ** 2))
-
-
-def motion_responses(problem: EstimationProblem, made: Fit) -> Floats:
-    """Return what every force that the motion decides does to the prediction errors, of length `VAGUE`, shape (w, terms)."""
-    force_model = fitted_force_model(problem.plain, made)
-    here, columns = problem.white(force_model), []
-    for term in terms_of(problem.steps.measurements):
-        if term.on not in AXES or not term.of_vessel:
-            continue
-        force = term.force(force_model)
-        size = float(np.sqrt(np.nanmean(force**2)))
-        if not size > 0.0:
-            continue
-        moved = replace(force_model, external=force_model.external + force / size)
-        change = problem.white(moved) - here
-        columns.append(change * (VAGUE / max(float(np.linalg.norm(change)), 1e-300)))
-    return np.stack(columns, axis=1)
