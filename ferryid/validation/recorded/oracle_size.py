@@ -32,6 +32,7 @@ from scipy.stats import norm
 from ferryid.diagnose.data import read_measurements
 from ferryid.diagnose.inference import INFERENCE, EstimationProblem, fit, motion_responses
 from ferryid.diagnose.judging import candidates_of, response_columns
+from ferryid.effects import effects
 from ferryid.types import Floats
 from ferryid.validation.case import Truth
 from ferryid.validation.detection_curves import RELIABLE
