@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ferryid.counts import counted
 from ferryid.effects.equations_of_motion import accelerations, from_antenna, required, slopes
-from ferryid.effects.wind_loads import shape_of, steady_wind_force, weighed_loads_by_row
+from ferryid.effects.wind_loads import shape_of, steady_wind_force, weighed_loads
 from ferryid.types import Floats, Ints
 from ferryid.vessel.hull import payload_mass
 from ferryid.vessel.profile import Profile
@@ -343,7 +343,7 @@ def wind_load_by_row(measurements: Measurements, air: Floats, away: Floats, weig
     # Compiled code does not look where an array ends.
     if len(winds) != len(nu):
         raise ValueError(f"{counted(len(nu), 'row')} with {counted(len(winds), 'wind')}")
-    return weighed_loads_by_row(winds, away, weights, *measurements.pointing, nu, shape_of(areas))
+    return weighed_loads(winds, away, weights, *measurements.pointing, nu, shape_of(areas))
 
 
 def between(

@@ -41,7 +41,7 @@ def steady_wind_force(
     nu
         Velocities over ground, shape (n, 3).
     """
-    return weighed_loads(winds_ne, weights, cosine, sine, nu, shape_of(areas))
+    return weighed_loads(np.zeros((1, 2)), winds_ne, weights, cosine, sine, nu, shape_of(areas))
 
 
 def shape_of(areas: WindAreas) -> Shape:
@@ -96,39 +96,15 @@ def load_at(
 
 
 @compiled
-def weighed_loads(winds: Floats, weights: Floats, cosine: Floats, sine: Floats, nu: Floats, shape: Shape) -> Floats:
-    """Return `steady_wind_force`."""
-    n = nu.shape[0]
-    out = np.empty((n, 3))
-    u, v, X, Y, N = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK)
-    for first in range(0, n, BLOCK):
-        rows = min(BLOCK, n - first)
-        c, s = cosine[first : first + rows], sine[first : first + rows]
-        for i in range(rows):
-            u[i], v[i] = nu[first + i, 0], nu[first + i, 1]
-            X[i], Y[i], N[i] = 0.0, 0.0, 0.0
-        for w in range(winds.shape[0]):
-            north, east, weight = winds[w, 0], winds[w, 1], weights[w]
-            for i in range(rows):
-                x, y, turn = load_at(c[i], s[i], u[i], v[i], north, east, shape)
-                X[i] += weight * x
-                Y[i] += weight * y
-                N[i] += weight * turn
-        for i in range(rows):
-            out[first + i, 0], out[first + i, 1], out[first + i, 2] = X[i], Y[i], N[i]
-    return out
-
-
-@compiled
-def weighed_loads_by_row(
+def weighed_loads(
     winds: Floats, away: Floats, weights: Floats, cosine: Floats, sine: Floats, nu: Floats, shape: Shape
 ) -> Floats:
-    """Return the weighted sum of the loads of winds about one that every row has of its own, shape (n, 3) [N, N, N·m].
+    """Return the weighted sum of the loads of several winds, shape (n, 3) [N, N, N·m].
 
     Parameters
     ----------
     winds
-        That of each row, shape (n, 2).
+        One that each row has of its own, shape (n, 2), or that all have, shape (1, 2).
     away, weights
         What is added to it, shape (w, 2), and the weight of the load of each, shape (w,).
     cosine, sine, nu
@@ -137,6 +113,7 @@ def weighed_loads_by_row(
         `shape_of` the areas.
     """
     n = nu.shape[0]
+    every = 1 if winds.shape[0] > 1 else 0
     out = np.empty((n, 3))
     u, v, X, Y, N = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK)
     ahead, aside = np.empty(BLOCK), np.empty(BLOCK)
@@ -145,7 +122,7 @@ def weighed_loads_by_row(
         c, s = cosine[first : first + rows], sine[first : first + rows]
         for i in range(rows):
             u[i], v[i] = nu[first + i, 0], nu[first + i, 1]
-            ahead[i], aside[i] = winds[first + i, 0], winds[first + i, 1]
+            ahead[i], aside[i] = winds[every * (first + i), 0], winds[every * (first + i), 1]
             X[i], Y[i], N[i] = 0.0, 0.0, 0.0
         for w in range(away.shape[0]):
             north, east, weight = away[w, 0], away[w, 1], weights[w]

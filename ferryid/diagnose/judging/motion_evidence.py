@@ -41,8 +41,7 @@ def beyond_any_hull(
 
     Its evidence must be `INFERENCE.contrast` times that of any effect, and that of every other effect, whether the fit has it
     or not; it must be ahead of any other in its place by the odds of an effect, and gain as much where any force of the motion
-    is free. How strong an actuator is shows by
-    masses and damping alone, which nobody knows.
+    is free. How strong an actuator is shows by masses and damping alone, which nobody knows.
 
     Parameters
     ----------
