@@ -130,7 +130,12 @@ def run(quick: bool) -> Section:
     slope_s = max((long_log_s - short_log_s) / (long_rows - short_rows), 0.0)
     log_times = LogTimes(max(short_log_s - slope_s * short_rows, 0.0), slope_s, short_rows, long_rows)
     curves = [
-        Curve(what, "single-thread workers of a Dask cluster", [(float(count), took) for count, took in times.items()])
+        Curve(
+            what,
+            "single-thread workers of a Dask cluster",
+            [(float(count), took) for count, took in times.items()],
+            shared=True,
+        )
         for what, times in ((f"batch of {logs} logs", found.batch), ("cases of the proof", found.proof))
         if times
     ]

@@ -48,7 +48,7 @@ def run(quick: bool) -> Section:
         together = {count: [written(folder, 1 + k, part_s) for k in range(count)] for count in logs}
         rows, curves, shortest_s = list[Row | Timed](), list[Curve](), nan
         for title, against, kind, goals in (
-            ("{:.0f} min", "length [min]", single, lengths),
+            ("diagnose, {:.0f} min", "length [min]", single, lengths),
             (f"campaign of {{:.0f}} logs of {part_s / 60:.2g} min", "number of logs", together, logs),
         ):
             times: dict[float, float] = {}

@@ -16,6 +16,7 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from ferryid.report.figures import BASE, MEASURED, NEW, STYLE, svg_text
 from tests.bench import yardstick
@@ -71,11 +72,15 @@ class Timed:
 
 @dataclass(frozen=True)
 class Curve:
-    """How a time grows: (size, time [s]), and what the size is; curves against the same are drawn together."""
+    """How a time grows: (size, time [s]), and what the size is; curves against the same are drawn together.
+
+    Where `shared`, the size is that of what does the work, and the time in proportion falls.
+    """
 
     what: str
     against: str
     points: Sequence[tuple[float, float]]
+    shared: bool = False
 
 
 @dataclass(frozen=True)
@@ -202,10 +207,11 @@ def growth(curves: Sequence[Curve]) -> str:
                 min(size for one in shown for size, _ in one.points),
                 max(size for one in shown for size, _ in one.points),
             ]
-            low = min(time_s for one in shown for _, time_s in one.points)
+            first = min(time_s for one in shown for size, time_s in one.points if size == ends[0])
+            growing = ends[0] / ends[1] if shown[0].shared else ends[1] / ends[0]
             ax.loglog(
                 ends,
-                [low, low * ends[1] / ends[0]],
+                [first, first * growing],
                 color=MEASURED,
                 linestyle=":",
                 linewidth=0.8,
@@ -213,7 +219,13 @@ def growth(curves: Sequence[Curve]) -> str:
             )
             ax.set_xlabel(against)
             ax.set_ylabel("time [s]")
-            ax.legend()
+            # Counts and minutes read better as they are than as powers of ten.
+            ax.set_xticks(sorted({size for one in shown for size, _ in one.points}))
+            ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            for axis in (ax.xaxis, ax.yaxis):
+                axis.set_major_formatter("{x:g}")
+                axis.set_minor_formatter(NullFormatter())
+            ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
         return svg_text(figure)
 
 
