@@ -4,17 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from ferryid.errors import FerryIdError
+from ferryid.identify.fit_data import Coefficients
 from ferryid.signals.prepare import Opened, open_track
 from ferryid.vessel import load_profile
 from tests.real.places import DATA
+from tests.rivals.methods import METHODS
+from tests.rivals.output_error import fit_output_error
 from tests.rivals.packing import packed_scores, unpacked_scores
 from tests.rivals.scores import Score, judge, together
 from tests.rivals.task import Task
 
 FOLDS = 3
+INSIDER = "output error, judged recordings"
+"""Output error fitted to the very recordings that judge it: no rival, but what these terms can hardly do better than."""
 
 
 @dataclass(frozen=True)
@@ -46,10 +52,14 @@ CASES = (
 
 @dataclass(frozen=True)
 class Recorded:
-    """What came of one case: scores by method, how many recordings, how long together [s], and which could not be used."""
+    """What came of one case: scores by method, how many recordings, how long together [s], and which could not be used.
+
+    `insider` is the score of `INSIDER`, which is no rival.
+    """
 
     case: Case
     scores: dict[str, Score]
+    insider: Score
     logs: int
     seconds: float
     refused: tuple[str, ...]
@@ -58,6 +68,7 @@ class Recorded:
         """Return all but the case as plain values."""
         return {
             "scores": packed_scores(self.scores),
+            "insider": packed_scores({INSIDER: self.insider}),
             "logs": self.logs,
             "seconds": self.seconds,
             "refused": list(self.refused),
@@ -66,8 +77,8 @@ class Recorded:
     @classmethod
     def of(cls, case: Case, plain: Mapping[str, Any]) -> Recorded:
         """Return what `plain` gave."""
-        scores = unpacked_scores(plain["scores"])
-        return cls(case, scores, plain["logs"], plain["seconds"], tuple(plain["refused"]))
+        scores, insider = unpacked_scores(plain["scores"]), unpacked_scores(plain["insider"])[INSIDER]
+        return cls(case, scores, insider, plain["logs"], plain["seconds"], tuple(plain["refused"]))
 
 
 def recorded(case: Case) -> Recorded | None:
@@ -81,10 +92,20 @@ def recorded(case: Case) -> Recorded | None:
         logs = [part for log in logs for part in parts(log, case.parts)]
     profile = load_profile(case.vessel)
     folds = [(logs, others)] if others else list(held_out(logs))
-    scores = [judge(Task.of(profile, learnt), Task.of(profile, judged)) for learnt, judged in folds]
+    scores = together([_judged(Task.of(profile, learnt), Task.of(profile, judged)) for learnt, judged in folds])
+    insider = scores.pop(INSIDER)
     every = [*logs, *others]
     seconds = sum(float(one.measured.usable.sum()) / one.measured.rate_hz for one in every)
-    return Recorded(case, together(scores), len(every), seconds, tuple(refused))
+    return Recorded(case, scores, insider, len(every), seconds, tuple(refused))
+
+
+def _judged(task: Task, test: Task) -> dict[str, Score]:
+    return judge(task, test, {**METHODS, INSIDER: partial(_inside, test)})
+
+
+def _inside(test: Task, _task: Task, draws: int) -> Coefficients:
+    """Return output error's fit to what it is judged on."""
+    return fit_output_error(test, draws)
 
 
 def opened(pattern: str, vessel: str, refused: list[str]) -> list[Opened]:

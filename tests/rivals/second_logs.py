@@ -45,10 +45,12 @@ SEED, RUNS = 2020, 0.2
 FIT = "fit"
 FEWEST = 10
 """Logs from which on it is said whether an aim is reached."""
-OF_CASE = ("cell", "concealed", "true_starts_m")
-"""What a line has beside the scores: the kind of the case, its effects, and errors of free runs from true states."""
+OF_CASE = ("cell", "concealed", "true_starts_m", "bases")
+"""What a line has beside the scores: kind of the case, its effects, errors from true states, and `fit` with other bases."""
 SHIFTS_S = np.linspace(-2.0, 2.0, 41)
 """Times by which a log may begin after the trial did [s]; its clock is its own."""
+BASES = ("lift", "second-order")
+"""Bases with which `fit` is tried as well; they are not compared with the rest, as nobody chose them before the second log."""
 NEAR = 1.05
 """Error over the best one's up to which a model counts as best."""
 
@@ -68,15 +70,25 @@ def try_case(case: Case, folder: Path) -> dict[str, Any]:
     out = place / "out"
     diagnosis = diagnose_log(first.log, first.profile, out)
     diagnosed = None if diagnosis.model is None else out / diagnosis.model
-    learners = {FIT: learn_fit, **RIVALS, "output error": learn_output_error}
+    others = {basis: partial(learn_fit, basis=basis) for basis in BASES}
+    learners = {FIT: learn_fit, **RIVALS, "output error": learn_output_error, **others}
     profile = load_profile(first.profile)
     found = transfer(str(first.log), str(second.log), profile, out, diagnosed=diagnosed, rivals=learners)
+    scores, true = found.scores(), true_starts(found, case)
     return {
         "cell": case.cell,
         "concealed": [truth.effect for truth in case.truths],
-        "true_starts_m": true_starts(found, case),
-        **found.scores().to_json(),
+        "true_starts_m": {name: error for name, error in true.items() if name not in BASES},
+        "bases": {
+            basis: [_finite(measure(scores.methods[basis])) for measure in (force_error, position_error)]
+            for basis in BASES
+        },
+        **replace(scores, methods={name: one for name, one in scores.methods.items() if name not in BASES}).to_json(),
     }
+
+
+def _finite(value: float) -> float | None:
+    return value if isfinite(value) else None
 
 
 def true_starts(found: Transfer, case: Case) -> dict[str, float | None]:
@@ -107,9 +119,9 @@ def true_starts(found: Transfer, case: Case) -> dict[str, float | None]:
     return errors
 
 
-def learn_fit(log: str, profile: Profile, out: Path) -> LearnedModel:
-    """Fit as ``ferryid fit`` does."""
-    return _learned(FIT, _fitted(log, profile, out), profile)
+def learn_fit(log: str, profile: Profile, out: Path, basis: str = "modulus") -> LearnedModel:
+    """Fit as ``ferryid fit`` does, with its own basis or another."""
+    return _learned(FIT, _fitted(log, profile, out, basis), profile)
 
 
 def learn_output_error(log: str, profile: Profile, out: Path) -> LearnedModel:
@@ -125,8 +137,8 @@ def learn_output_error(log: str, profile: Profile, out: Path) -> LearnedModel:
     return _learned("output error", replace(like, theta=found.theta, intercept=found.intercept), profile)
 
 
-def _fitted(log: str, profile: Profile, out: Path) -> Model:
-    return fit_logs([log], profile, FitSettings(draws=2), RunContext(out)).model
+def _fitted(log: str, profile: Profile, out: Path, basis: str = "modulus") -> Model:
+    return fit_logs([log], profile, FitSettings(draws=2, basis=basis), RunContext(out)).model
 
 
 def _learned(name: str, model: Model, profile: Profile) -> LearnedModel:
@@ -159,7 +171,7 @@ def position_error(score: TransferScore) -> float:
 
 def section(found: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return the part of the page about second logs."""
-    results = [_result(one) for one in found]
+    results = [result(one) for one in found]
     lines = [
         "\n## Second logs of the proof\n",
         f"{counted(len(results), 'case')} of `ferryid prove` (seed {SEED}), each learnt from its first log and judged on its "
@@ -178,18 +190,18 @@ def section(found: Sequence[Mapping[str, Any]]) -> list[str]:
         "no model or diverged |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
-    truly = [np.mean(one) for one in zip(*(_best_truly(each) for each in found), strict=True)]
+    truly = [np.mean(one) for one in zip(*(best_truly(each) for each in found), strict=True)]
     ours = np.array([position_error(one.methods[DIAGNOSED]) for one in results])
     for place, name in enumerate(results[0].methods):
         force = np.array([force_error(one.methods[name]) for one in results])
         position = np.array([position_error(one.methods[name]) for one in results])
         rows = np.array([row_error(one.methods[name]) for one in results])
         base = np.array([one.base.position_m or np.nan for one in results])
-        best = [np.mean(_best(results, name, measure)) for measure in (force_error, position_error)]
+        first = [np.mean(best(results, name, measure)) for measure in (force_error, position_error)]
         title = "diagnosed and learnt (`diagnose`)" if name == DIAGNOSED else name
         lines.append(
             f"| {title} | {np.median(force):.2f} | {np.median(rows):.2f} | {np.nanmedian(position / base):.2f} | "
-            f"{np.median(ours / position):.2f} | {100 * best[0]:.0f} % | {100 * best[1]:.0f} % | {100 * truly[place]:.0f} % | "
+            f"{np.median(ours / position):.2f} | {100 * first[0]:.0f} % | {100 * first[1]:.0f} % | {100 * truly[place]:.0f} % | "
             f"{int(np.sum(~np.isfinite(position)))} |"
         )
     truth = [
@@ -212,7 +224,7 @@ def _true_errors(plain: Mapping[str, Any]) -> dict[str, float]:
     return {name: float("inf") if known.get(name) is None else float(known[name]) for name in plain["methods"]}
 
 
-def _best_truly(plain: Mapping[str, Any]) -> list[bool]:
+def best_truly(plain: Mapping[str, Any]) -> list[bool]:
     errors = list(_true_errors(plain).values())
     return [one <= NEAR * min(errors) for one in errors]
 
@@ -255,10 +267,10 @@ def _log_by_log(found: Sequence[Mapping[str, Any]], results: Sequence[TransferRe
 
 def targets(found: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return what is aimed at on second logs and what was reached, as rows of a table."""
-    results = [_result(one) for one in found]
+    results = [result(one) for one in found]
     rows = []
     for what, measure in (("force", force_error), ("free run", position_error)):
-        share = 100.0 * float(np.mean(_best(results, DIAGNOSED, measure)))
+        share = 100.0 * float(np.mean(best(results, DIAGNOSED, measure)))
         met = _reached(share >= 90.0, len(results))
         rows.append(
             f"| second logs: diagnosed model best or within 5 %, {what}, on 90 % | {met} | "
@@ -278,7 +290,7 @@ def _reached(good: bool, logs: int) -> str:
     return "too few logs" if logs < FEWEST else "yes" if good else "no"
 
 
-def _best(results: Sequence[TransferResult], name: str, measure: Any) -> list[bool]:
+def best(results: Sequence[TransferResult], name: str, measure: Any) -> list[bool]:
     out = []
     for one in results:
         least = min(measure(score) for score in one.methods.values())
@@ -286,5 +298,5 @@ def _best(results: Sequence[TransferResult], name: str, measure: Any) -> list[bo
     return out
 
 
-def _result(plain: Mapping[str, Any]) -> TransferResult:
+def result(plain: Mapping[str, Any]) -> TransferResult:
     return TransferResult.from_json({name: value for name, value in plain.items() if name not in OF_CASE})

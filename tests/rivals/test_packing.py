@@ -8,8 +8,10 @@ import numpy as np
 
 from tests.evidence import Lines
 from tests.rivals.__main__ import run
+from tests.rivals.causes import damping, free_runs, intervals
+from tests.rivals.measures import OURS
 from tests.rivals.packing import packed, packed_scores, unpacked, unpacked_scores
-from tests.rivals.page import OURS, damping_notes
+from tests.rivals.recorded import CASES, Recorded
 from tests.rivals.scores import Score
 from tests.rivals.simulated import Found
 
@@ -55,13 +57,40 @@ def test_findings_and_scores_come_back(tmp_path: Path) -> None:
     assert again.diverged == 1
 
 
+def test_the_page_says_whose_intervals_hold_too_much_and_what_chance_leaves_open() -> None:
+    def trial(covered: float) -> dict[str, Found | str]:
+        inertia = np.array([0.001, -0.01, 0.02])
+        return {OURS: Found(inertia, 0.04, np.array([1.0, 1.0, covered]), np.zeros((1, 3, 4)), 1.0, 0.03)}
+
+    (line,) = intervals({"calm": [trial(1.0)] * 29 + [trial(0.0)]})
+    assert "98.9 % (89/90) [94.0, 100.0]. By inertia: m11 100.0 % (median error 0.1 %)" in line
+    assert "m33 96.7 % (median error 2.0 %)" in line
+    assert intervals({"calm": [trial(1.0)] * 17 + [trial(0.0)] * 3}) == []
+
+
+def test_the_page_says_where_a_fit_to_the_judged_recordings_is_no_better_either() -> None:
+    def score(position_m: float) -> Score:
+        runs = np.full((40, 3, 4), position_m)
+        return Score(np.ones((2, 3)), np.ones((2, 3)), np.ones(2), runs, 2.0)
+
+    def case(ours: float, inside: float) -> Recorded:
+        return Recorded(CASES[0], {OURS: score(ours), "output error": score(1.0)}, score(inside), 1, 60.0, ())
+
+    (line,) = free_runs([case(0.9, 0.8), case(0.95, 0.5)])
+    assert "aim a quarter less in the median: 0.93" in line or "aim a quarter less in the median: 0.92" in line
+    assert "has 0.50, 0.80 of that error in the 2 sets: on 1 of them not even it is a quarter better" in line
+    assert free_runs([case(0.5, 0.4), case(0.7, 0.6)]) == []
+
+
 def test_the_page_says_where_the_damping_misses_and_what_is_to_be_expected() -> None:
     def trial(damping: float, expected: float) -> dict[str, Found | str]:
         return {OURS: Found(np.zeros(3), damping, np.ones(3), np.zeros((1, 3, 4)), 1.0, expected)}
 
     found = {"met": [trial(0.04, 0.03)], "limit": [trial(0.07, 0.06)], "worse": [trial(0.09, 0.02)]}
-    text = "\n".join(damping_notes(found))
+    text = "\n".join(damping(found))
     assert "met" not in text
-    assert "- limit: damping 7.0 %, expected by the covariance of the fit 6.0 %: the aim is below that." in text
-    assert "- worse: damping 9.0 %, expected by the covariance of the fit 2.0 %: more than is to be expected." in text
-    assert damping_notes({"met": found["met"]}) == []
+    assert "Damping force, limit: 7.0 %, expected by the covariance of the fit 6.0 %: the aim is below that." in text
+    assert (
+        "Damping force, worse: 9.0 %, expected by the covariance of the fit 2.0 %: more than is to be expected." in text
+    )
+    assert damping({"met": found["met"]}) == []

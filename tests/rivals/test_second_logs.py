@@ -12,7 +12,7 @@ from ferryid.validation.log_generation import generate
 from ferryid.validation.records import DIAGNOSED, StoredEffectNote, TransferResult, TransferScore
 from ferryid.validation.transfer_test import transfer
 from ferryid.vessel import load_profile
-from tests.rivals import second_logs
+from tests.rivals import causes, second_logs
 from tests.rivals.second_logs import FIT, cases, force_error, position_error, section, targets, true_starts
 
 
@@ -33,7 +33,8 @@ def result(*known: str, **methods: TransferScore) -> dict[str, Any]:
         name: one.position_m and one.position_m * (0.5 if name == DIAGNOSED else 1.0) for name, one in named.items()
     }
     plain = TransferResult(score(100.0, 4.0), named).to_json()
-    return {"cell": "wind", "concealed": ["wind"], "true_starts_m": true, **plain}
+    bases = {"lift": [0.4, 0.3], "second-order": [0.6, 5.0]}
+    return {"cell": "wind", "concealed": ["wind"], "true_starts_m": true, "bases": bases, **plain}
 
 
 FOUND = [
@@ -77,6 +78,16 @@ def test_each_log_says_what_was_concealed_and_how_the_diagnosed_model_stands() -
     assert lines[-1].startswith(
         "On 1 log another model has the least force error; in 1 of them the diagnosed one lacks some"
     )
+
+
+def test_free_runs_that_another_model_wins_are_put_down_to_starts_to_what_is_unnamed_or_to_the_rest() -> None:
+    first, rival, lift, second = causes.second_logs(FOUND)
+    # From true starts ours has 0.5 as fit in the first log; 1.5 / 2.0 is best in the third, where nothing is in the model.
+    assert "2 logs of 3 on which another model is more than 5 % ahead: on 2 ours is best from true starts" in first
+    assert "on 0 nothing is in the model" in first
+    assert "the one that is best over all logs, stepwise, the diagnosed model has 0.50 in the median" in rival
+    assert lift.startswith("`fit --basis lift`: position errors 0.10 times those of the default")
+    assert second.endswith("more on 3.")
 
 
 @pytest.mark.slow
