@@ -201,8 +201,8 @@ def section(found: Sequence[Mapping[str, Any]]) -> list[str]:
         title = "diagnosed and learnt (`diagnose`)" if name == DIAGNOSED else name
         lines.append(
             f"| {title} | {np.median(force):.2f} | {np.median(rows):.2f} | {np.nanmedian(position / base):.2f} | "
-            f"{np.median(ours / position):.2f} | {100 * first[0]:.0f} % | {100 * first[1]:.0f} % | {100 * truly[place]:.0f} % | "
-            f"{int(np.sum(~np.isfinite(position)))} |"
+            f"{np.median(ours / position):.2f} | {100 * first[0]:.0f} % | {100 * first[1]:.0f} % | "
+            f"{100 * truly[place]:.0f} % | {int(np.sum(~np.isfinite(position)))} |"
         )
     truth = [
         100.0 * truly[list(results[0].methods).index(DIAGNOSED)],
