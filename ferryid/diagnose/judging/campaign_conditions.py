@@ -47,6 +47,7 @@ from ferryid.effects import effects
 from ferryid.effects.effect import Parameter
 from ferryid.effects.wording import listed, weak_evidence
 from ferryid.types import AXES, Floats
+from ferryid.vessel.circumstances import Circumstances
 
 
 @dataclass(frozen=True)
@@ -413,7 +414,9 @@ def _finding(test: ConditionTest, i: int, tests: tuple[ConditionTest, ...]) -> F
             if one.effect not in (test.effect, *test.beside)
         ),
         unresolved_with=test.unresolved,
-        separating_manoeuvre=manoeuvre(test.effect, test.unresolved, errors.windows.measurements.profile.setting),
+        separating_manoeuvre=manoeuvre(
+            test.effect, test.unresolved, Circumstances.of(errors.windows.measurements.profile)
+        ),
         says=says,
         course=test.courses[i] if test.courses else None,
         **_figure(test, i, errors, shares, value),

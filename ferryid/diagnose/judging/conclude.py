@@ -40,6 +40,7 @@ from ferryid.diagnose.judging.locate import locate, locate_between
 from ferryid.diagnose.judging.posterior import Posterior, posterior_of
 from ferryid.diagnose.judging.verdict import Remainder, verdict_of
 from ferryid.types import AXES, Floats
+from ferryid.vessel.circumstances import Circumstances
 
 TEN_MINUTES = {
     "": "Record at least ten minutes that excite every axis.",
@@ -129,13 +130,18 @@ def _too_short(
     together: JudgedCampaign | None,
 ) -> Diagnosis:
     screened = log.screened
-    setting = screened.measurements.profile.setting
-    figures = replace(shared, joint=baseline.joint, baseline_sensors=baseline.sensors, setting=setting)
+    where = Circumstances.of(screened.measurements.profile)
+    figures = replace(
+        shared,
+        joint=baseline.joint,
+        baseline_sensors=baseline.sensors,
+        circumstances=where,
+    )
     findings, notes = apply_rules(claims, figures)
     profile, window_s = screened.measurements.profile, _window_s(log.windows.weight, log.windows.measurements.step_s)
     # Bags of seconds are welcome in a campaign that they have a say in.
     advice = (
-        TEN_MINUTES.get(setting, TEN_MINUTES[""])
+        TEN_MINUTES.get(where.setting, TEN_MINUTES[""])
         if together is None or log.path not in together.hull.place
         else "What all logs say together of hull and properties holds for it too."
     )
@@ -206,7 +212,7 @@ def _concluded(
         *rule_notes,
         *log_notes(figures),
         *untested_notes(selected.search.untested),
-        *recording_advice(chances, still, measurements.profile.setting),
+        *recording_advice(chances, still, log.figures.circumstances),
     )
     return Diagnosis(
         survey.used.log,

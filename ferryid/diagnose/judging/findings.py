@@ -35,6 +35,7 @@ from ferryid.diagnose.judging.onset_evidence import sets_in
 from ferryid.diagnose.judging.time_posterior import TimePosterior
 from ferryid.effects.force_model import Measurements
 from ferryid.types import AXES, Floats
+from ferryid.vessel.circumstances import Circumstances
 
 TIME_FIT = 3
 """Steps of the fit for each time that an effect may have begun or ended at."""
@@ -115,7 +116,7 @@ def _force_claim(
         held_out=proof is not None,
         rivals=rivals,
         unresolved_with=unresolved,
-        separating_manoeuvre=manoeuvre(candidate.effect.id, unresolved, measurements.profile.setting),
+        separating_manoeuvre=manoeuvre(candidate.effect.id, unresolved, Circumstances.of(measurements.profile)),
         says=candidate.effect.says(reported, candidate.instance) if reported else "",
         **figure_columns(
             problem, place, figure_regressor(candidate, fitted_force_model(problem.plain, bare), values, place)
