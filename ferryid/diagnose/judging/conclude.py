@@ -15,6 +15,7 @@ from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted_force_model
 from ferryid.diagnose.inference.force_errors import force_errors, mass_of
 from ferryid.diagnose.inference.stages import AveragedLog, Baseline
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.campaign import JudgedCampaign
 from ferryid.diagnose.judging.campaign_posterior import campaign_posterior
@@ -145,8 +146,10 @@ def _too_short(
         if together is None or log.path not in together.hull.place
         else "What all logs say together of hull and properties holds for it too."
     )
-    short = f"Only {counted(len(log.windows.starts), 'stretch')} of {window_s:.0f} s without a gap: too few for a conclusion "
-    short += f"from this log alone. {advice}"
+    short = (
+        f"Only {counted(len(log.windows.starts), 'window')} of {window_s:.0f} s, which overlap, are without a gap, and "
+        f"{INFERENCE.fewest_windows} are needed: too few for a conclusion from this log alone. {advice}"
+    )
     remainder = Remainder(testable=False)
     errors = None if together is None else together.errors(log.path, findings)
     before, after = ({}, {}) if errors is None else errors.scores(window_s)
