@@ -33,12 +33,10 @@ MIRRORED, EXCHANGED = "the heading mirrored", "another log's heading"
 
 @dataclass(frozen=True)
 class HeldOutLoss:
-    """Minus twice the log-likelihood of held-out blocks, shape (blocks,), the log of each, and the errors of all windows.
+    """Whitened squares of held-out blocks, shape (blocks,), the log of each, and the errors of every log's windows.
 
-    The likelihood is that of the prediction with its uncertainty, without the constant: whitened squares over their expected
-    ones, and the logarithm of these. Of a block that is most of its log the log's own conditions are not known, and the
-    prediction is wide, not wrong. What the rest cannot predict of a block shows no error; a block of which it predicts nothing
-    has NaN. The errors are accelerations along the vessel's axes, shape (J, 3) for each log.
+    What the rest cannot predict of a block shows no error; the squares of one of which it predicts nothing are NaN. The errors
+    are accelerations along the vessel's axes, shape (J, 3) for each log.
     """
 
     blocks: Floats
@@ -96,11 +94,8 @@ def _log_loss(made: CampaignFit, i: int, gaps: Floats, slopes: Floats) -> tuple[
             continue
         along = along[:, predicted]
         shift = C @ (J.T @ (along @ ((along.T @ w) / shares[predicted])))
-        left, own = (part.gaps[block] + part.slopes[block] @ shift).ravel(), part.slopes[block].reshape(-1, C.shape[0])
-        # The posterior without the block: what a log's own condition may be is wide where the block is most of the log.
-        back = along.T @ J @ C
-        S = np.eye(len(left)) + own @ (C + back.T @ (back / shares[predicted][:, None])) @ own.T
-        squares.append(float(left @ np.linalg.solve(S, left) + np.linalg.slogdet(S)[1]))
+        left = part.gaps[block] + part.slopes[block] @ shift
+        squares.append(float(np.sum(left**2)))
         errors[block] += slopes[block] @ shift
     return np.array(squares), errors
 
