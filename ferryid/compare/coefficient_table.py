@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from ferryid.compare.candidates import Candidate
 from ferryid.compare.comparison_result import Coefficient, CoefficientRow, EffectInModel, EffectRow, TermRow
 from ferryid.effects.force_model import COEFFICIENTS, LIFT, MASS, UNITS
 from ferryid.models import Model, StoredEffect
-from ferryid.models.forces import MAPPED, hull_coefficients, model_estimator
+from ferryid.models.coefficients import coefficient_intervals, opposite, term_interval
+from ferryid.models.forces import MAPPED, model_estimator
 from ferryid.types import AXES, Floats
 
 PRODUCTS = (
@@ -60,10 +59,7 @@ _UNITS = {
 
 def _effective(model: Model) -> dict[str, Floats]:
     """Return value, low and high of every coefficient, shape (3,) each."""
-    hull = hull_coefficients(model)
-    found = {name: hull[k] + _reach(model, name) for k, name in enumerate(COEFFICIENTS)}
-    for name, told in model.hull.items():
-        found[name] = np.array([told.value, told.low, told.high])
+    found = coefficient_intervals(model)
     force = model_estimator(model)
     # The Coriolis force is that of the base model's mass: a correction of the inertia does not reach it.
     M = force.profile.hull.M * force.scale.get("delta", 1.0) / force.scale.get("zeta", 1.0)
@@ -71,37 +67,10 @@ def _effective(model: Model) -> dict[str, Floats]:
     coriolis = (-m22, -cross, 0.0, m11, m22 - m11, cross)
     for (name, term, axis, _), turning in zip(PRODUCTS, coriolis, strict=True):
         lift = f"{'XYN'[axis]}_{term}"
-        found[name] = turning + (_opposite(found[lift]) if lift in LIFT else _term(model, term, axis))
+        found[name] = turning + (opposite(found[lift]) if lift in LIFT else term_interval(model, term, axis))
     for name, term, axis, _ in CUBES:
-        found[name] = _opposite(_term(model, term, axis))
+        found[name] = opposite(term_interval(model, term, axis))
     return found
-
-
-def _reach(model: Model, name: str) -> Floats:
-    """Return how far the interval of a hull's coefficient reaches from its value: 0, low and high, shape (3,).
-
-    Every basis has one function for each; what has none is the base model's, which has no interval.
-    """
-    for term, axis in MAPPED[name]:
-        if term in model.terms:
-            around = _term(model, term, axis)
-            around = around - around[0]
-            return around if name in MASS else _opposite(around)
-    return np.array([0.0, np.nan, np.nan])
-
-
-def _term(model: Model, term: str, axis: int) -> Floats:
-    """Return the coefficient of a term and its interval as the model file has them, shape (3,); none where it has no width."""
-    if term not in model.terms:
-        return np.array([0.0, np.nan, np.nan])
-    k = model.terms.index(term)
-    low, high = model.low[k, axis], model.high[k, axis]
-    return np.array([model.theta[k, axis], *((low, high) if low < high else (np.nan, np.nan))])
-
-
-def _opposite(interval: Floats) -> Floats:
-    """A SNAME coefficient gives the force that the water exerts, a term that which the motion takes."""
-    return -interval[[0, 2, 1]]
 
 
 def term_rows(candidates: Sequence[Candidate]) -> tuple[TermRow, ...]:

@@ -110,7 +110,7 @@ def compare_groups(
     if assembled is None:
         total = sum(len(one.windows.starts) for one in averaged)
         raise FerryIdError(
-            f"diagnose: the groups are too short to compare, found {counted(total, 'window')} in both and need "
+            f"diagnose: the groups are too short to compare, found {counted(total, 'overlapping window')} in both and need "
             f"{INFERENCE.fewest_windows}. Fix: give more or longer logs"
         )
     place = assembled[1]
@@ -118,7 +118,7 @@ def compare_groups(
         if not any(name_of[path] == group for path in place):
             raise FerryIdError(
                 f"diagnose: no log of group {group} is long enough to compare, each needs "
-                f"{counted(INFERENCE.campaign_windows, 'window')}. Fix: give longer logs"
+                f"{counted(INFERENCE.campaign_windows, 'overlapping window')}. Fix: give longer logs"
             )
     campaign = in_groups(assembled[0], [name_of[path] for path in place])
     judged = judge_groups(campaign, run.progress)

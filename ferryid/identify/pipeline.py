@@ -31,6 +31,7 @@ from ferryid.identify.own_conditions import with_own_conditions
 from ferryid.identify.physical_checks import physical_checks
 from ferryid.identify.rows import basis_for
 from ferryid.identify.settings import TEST_WINDOW_S, FitSettings, check_components
+from ferryid.identify.sign_changes import sign_changes
 from ferryid.identify.split import Split, TooShort, split_rows
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.weak_data import WeakData, weak_data
@@ -242,6 +243,7 @@ def accept_estimate(
             *final.held,
             *data.warnings(excitation, scores),
             *free_run_warnings(free_base, free_new),
+            *sign_changes(model),
             *final.notes,
         ),
         logs=logs,

@@ -48,7 +48,7 @@ def fit_weak_archive(
     if judged < IDENTIFY.fewest_judged:
         raise FerryIdError(
             f"{data.where}: too little for validation in the weak form, found {counted(len(data.logs), 'log')} with "
-            f"{counted(judged, 'validation window')} of {data.windows.length_s:.3g} s. "
+            f"{counted(judged, 'overlapping validation window')} of {data.windows.length_s:.3g} s. "
             "Fix: ingest more or longer logs, or give --estimator derivative"
         )
     data = (

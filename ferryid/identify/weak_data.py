@@ -236,7 +236,7 @@ class WeakData(LogData):
             return f"the weak form explains the measured force, found --residual {self.settings.residual}"
         found, length_s = sum(len(one) for one in self.windows.training), self.windows.training_length_s
         if found < IDENTIFY.fewest_windows:
-            needed = counted(IDENTIFY.fewest_windows, "window")
+            needed = counted(IDENTIFY.fewest_windows, "overlapping window")
             return f"the weak form needs {needed} of {length_s:.3g} s to train on, found {found}"
         return ""
 

@@ -100,10 +100,28 @@ def within(poses: Floats, area: tuple[float, float], size: tuple[float, float]) 
         Length and beam of the hull [m].
     """
     long, wide = sorted(area, reverse=True)
-    c, s = np.abs(np.cos(poses[:, 2])), np.abs(np.sin(poses[:, 2]))
-    north = np.abs(poses[:, 0]) + 0.5 * (c * size[0] + s * size[1])
-    east = np.abs(poses[:, 1]) + 0.5 * (s * size[0] + c * size[1])
+    north, east = np.abs(poses[:, :2]).T + _half(poses, size)
     return bool(north.max() <= 0.5 * long and east.max() <= 0.5 * wide)
+
+
+def room_of(poses: Floats, size: tuple[float, float]) -> tuple[float, float]:
+    """Return the sides [m] of the area that a hull takes, the longer first, with sides to the north and east.
+
+    Parameters
+    ----------
+    poses, size
+        As of `within`.
+    """
+    half = _half(poses, size)
+    least, most = (poses[:, :2].T - half).min(axis=1), (poses[:, :2].T + half).max(axis=1)
+    short, long = sorted((most - least).tolist())
+    return long, short
+
+
+def _half(poses: Floats, size: tuple[float, float]) -> Floats:
+    """Return how far a hull reaches north and east of its middle [m], shape (2, n)."""
+    c, s = np.abs(np.cos(poses[:, 2])), np.abs(np.sin(poses[:, 2]))
+    return 0.5 * np.stack([c * size[0] + s * size[1], s * size[0] + c * size[1]])
 
 
 def _forces(vessel: Profile) -> tuple[float, float, float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import ceil
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -19,7 +20,7 @@ from ferryid.ingest import open_log
 from ferryid.ingest.hashing import content_hash
 from ferryid.models import Model
 from ferryid.planning.information import deviations, information
-from ferryid.planning.limits import CLEARANCE, Limits, limits_of, within
+from ferryid.planning.limits import CLEARANCE, Limits, limits_of, room_of, within
 from ferryid.planning.segments import STEP_S, segments
 from ferryid.planning.selection import choose, separated_from
 from ferryid.planning.steering import LEAD_S, Manoeuvre, manoeuvres
@@ -36,6 +37,8 @@ LEAST_MINUTES, MOST_MINUTES = 2.0, 120.0
 SETTLING_S = 10.0
 """At rest before the first manoeuvre, for a vessel of 5 m."""
 Pairs = Sequence[tuple[Key, Key]]
+HARDLY_BETTER = 0.95
+"""Of the standard deviations after the usual trial, expected after the planned one, as of which it is hardly better."""
 ROOM = 12.0
 """Longer side of the area in lengths of the vessel, where none is given; the other is two thirds of it."""
 
@@ -191,6 +194,9 @@ class Plan:
         Names of the logs whose information was taken in.
     generic_hull
         True where the profile has no hull model, so that a generic one of its dimensions was simulated.
+    area, usual_area
+        Sides of the area that it keeps to, the longer first, None where there is none; and of that which the usual trial
+        takes, the hull included [m].
     """
 
     vessel: Profile
@@ -203,6 +209,8 @@ class Plan:
     drawn: int
     after: tuple[str, ...] = ()
     generic_hull: bool = False
+    area: tuple[float, float] | None = None
+    usual_area: tuple[float, float] = (0.0, 0.0)
 
     @property
     def ratio(self) -> float:
@@ -219,6 +227,16 @@ class Plan:
         """Mean deviation, over that now, after the planned trial over that after the usual one: what the choice brings down."""
         planned, usual = (np.mean([getattr(one, name) / one.now for one in self.hull]) for name in ("planned", "usual"))
         return float(planned / usual)
+
+    @property
+    def hardly_better(self) -> bool:
+        """True where the planned trial is not worth its trouble: it tells about as much as the usual one, or less."""
+        return not self.expected_ratio < HARDLY_BETTER
+
+    @property
+    def usual_fits(self) -> bool:
+        """True where the usual trial keeps to the area."""
+        return self.area is None or all(a <= b for a, b in zip(self.usual_area, self.area, strict=True))
 
 
 def check_request(profile: Profile, settings: PlanSettings) -> Profile:
@@ -305,7 +323,7 @@ def _path(waters: Waters, known: Sequence[Responses], pairs: Pairs, settings: Pl
     scenario = waters.following(poses, limits)
     (planned,), _ = waters.tells(scenario, [len(poses) * step])
     run.progress("simulating the usual trial")
-    (usual,), _ = waters.tells(waters.twelve_corners(len(poses) * step), [len(poses) * step])
+    (usual,), corners = waters.tells(waters.twelve_corners(len(poses) * step), [len(poses) * step])
     times = step * (len(before) + np.cumsum([0, *(len(drawn[k].poses) for k, _ in chosen)]))
     return Plan(
         waters.vessel,
@@ -319,6 +337,8 @@ def _path(waters: Waters, known: Sequence[Responses], pairs: Pairs, settings: Pl
         _separated(pairs, known, usual, planned),
         "the twelve-corner trial of the same length",
         len(all_poses) - 1,
+        area=(max(area), min(area)),
+        usual_area=room_of(corners, (length, beam)),
     )
 
 
@@ -331,7 +351,7 @@ def _joined(parts: Sequence[Floats]) -> Floats:
 
 def _orders(waters: Waters, known: Sequence[Responses], pairs: Pairs, settings: PlanSettings, run: RunContext) -> Plan:
     """Return the plan of a vessel that steers: each manoeuvre is a trial by itself."""
-    time = waters.scale[1]
+    time, size = waters.scale[1], dimensions(waters.profile)[:2]
     drawn, parts, scenarios = list[Manoeuvre](), list[Responses](), list[Scenario]()
     narrowest = np.inf
     every = manoeuvres(time)
@@ -339,10 +359,10 @@ def _orders(waters: Waters, known: Sequence[Responses], pairs: Pairs, settings: 
         run.progress(f"simulating manoeuvre {k} of {len(every)}")
         scenario = waters.steering(one)
         (told,), track = waters.tells(scenario, [one.duration_s])
-        sides = sorted(np.ptp(track[:, :2], axis=0).tolist())
-        narrowest = min(narrowest, max(sides))
+        sides = room_of(track, size)
+        narrowest = min(narrowest, sides[0])
         if settings.area is not None and any(
-            side > room for side, room in zip(sides, sorted(settings.area), strict=True)
+            side > room for side, room in zip(sides, sorted(settings.area, reverse=True), strict=True)
         ):
             continue
         order = scenario.manoeuvre.speed_rpm
@@ -354,13 +374,13 @@ def _orders(waters: Waters, known: Sequence[Responses], pairs: Pairs, settings: 
         assert settings.area is not None
         raise FerryIdError(
             f"--area: {settings.area[0]:g}x{settings.area[1]:g} m has no room for any manoeuvre of {waters.vessel.name}. "
-            f"Fix: give at least {narrowest:.0f}x{narrowest:.0f}"
+            f"Fix: give at least {ceil(narrowest)}x{ceil(narrowest)}"
         )
     chosen = choose([one.duration_s for one in drawn], parts, known, pairs, settings.minutes * 60.0)
     ends = np.cumsum([0.0, *(drawn[k].duration_s for k, _ in chosen)])
     run.progress("simulating the usual trial")
     zigzag = replace(manoeuvres(time)[1], share=1.0, helm_deg=20.0, heading_deg=20.0, lead_s=LEAD_S * time)
-    (usual,), _ = waters.tells(waters.steering(replace(zigzag, duration_s=float(ends[-1]))), [float(ends[-1])])
+    (usual,), track = waters.tells(waters.steering(replace(zigzag, duration_s=float(ends[-1]))), [float(ends[-1])])
     planned = together([parts[k] for k, _ in chosen])
     return Plan(
         waters.vessel,
@@ -374,6 +394,8 @@ def _orders(waters: Waters, known: Sequence[Responses], pairs: Pairs, settings: 
         _separated(pairs, known, usual, planned),
         "a 20/20 zigzag of the same length",
         len(drawn),
+        area=None if settings.area is None else (max(settings.area), min(settings.area)),
+        usual_area=room_of(track, size),
     )
 
 

@@ -35,6 +35,8 @@ def as_json(plan: Plan) -> dict[str, Any]:
         ],
         "generic_hull": plan.generic_hull,
         "usual": plan.usual,
+        "usual_area_m": list(plan.usual_area),
+        "hardly_better": plan.hardly_better,
         "ratio": plan.ratio if isfinite(plan.ratio) else None,
         "mean_ratio": plan.mean_ratio if isfinite(plan.mean_ratio) else None,
         "expected_ratio": plan.expected_ratio if isfinite(plan.expected_ratio) else None,
@@ -77,6 +79,8 @@ def as_text(plan: Plan) -> str:
     if plan.track is not None:
         u, v, r = plan.track.limits.speed
         lines.append(f"speeds up to {u:.2g} m/s ahead, {v:.2g} m/s sideways, {r:.2g} rad/s of turn")
+    if doubt := warning(plan):
+        lines += ["", doubt]
     lines += [
         "",
         *(f"  {_clock(one.begin_s)}  {one.says}" for one in plan.chosen),
@@ -92,13 +96,23 @@ def as_text(plan: Plan) -> str:
     return "\n".join(lines)
 
 
+def warning(plan: Plan) -> str:
+    """Return that the plan is not worth its trouble, why, and what would help; empty where it is."""
+    if not plan.hardly_better:
+        return ""
+    told = f"This plan is {'no' if plan.expected_ratio >= 1.0 else 'hardly'} better than {plan.usual}"
+    takes = f"{plan.usual_area[0]:.0f} x {plan.usual_area[1]:.0f} m"
+    if plan.usual_fits:
+        return f"{told}, which takes {takes}: record that, or give more --minutes."
+    assert plan.area is not None
+    return (
+        f"{told}, which takes {takes} and does not fit into {plan.area[0]:.0f} x {plan.area[1]:.0f} m: in such an area, runs "
+        "are short and slow. Give a larger --area, or more --minutes."
+    )
+
+
 def summary(plan: Plan) -> str:
     """Return what the plan is expected to gain, in a sentence."""
-    worse = (
-        ""
-        if plan.expected_ratio < 1.0
-        else " The usual trial shows more in this time: record that, or give more --minutes."
-    )
     generic = (
         " The profile has no hull model: a generic one of its dimensions was simulated." if plan.generic_hull else ""
     )
@@ -109,7 +123,7 @@ def summary(plan: Plan) -> str:
         f"Expected standard deviations of the hull's coefficients, over those now: in the mean of {len(plan.hull)} "
         f"{plan.expected_ratio:.2f} of that after {plan.usual}; coefficient by coefficient {plan.mean_ratio:.2f} in the "
         f"geometric mean and {plan.ratio:.2f} in the median{already}. They are for the noise of the "
-        f"simulator's sensors: they compare trials, and a recording will show larger ones.{less}{worse}{generic}"
+        f"simulator's sensors: they compare trials, and a recording will show larger ones.{less}{generic}"
     )
 
 

@@ -47,7 +47,7 @@ def effect_rows(diagnoses: Sequence[Diagnosis]) -> list[dict[str, str]]:
             {
                 "name": diagnosis_words.title(every[0].effect, every[0].instance),
                 "logs": ", ".join(counts),
-                "size": _sizes([one.parameters for one in sure or every]),
+                "size": _sizes(every[0].effect, [one.parameters for one in sure or every]),
                 "probability": _range([one.probability for one in every]),
             }
         )
@@ -258,17 +258,18 @@ def _towards(flow: Mapping[str, float]) -> str:
     return f"{hypot(north, east):.2f} m/s towards {round(degrees(atan2(east, north))) % 360}°"
 
 
-def _sizes(every: Sequence[Mapping[str, Estimate]]) -> str:
+def _sizes(effect: str, every: Sequence[Mapping[str, Estimate]]) -> str:
     """Return the estimates of one log with their intervals, and the least and greatest of several."""
     if len(every) == 1:
-        return diagnosis_words.numbers_of(every[0])
+        return diagnosis_words.numbers_of(every[0], effect)
     parts = []
     for name, first in every[0].items():
-        values = [one[name].value for one in every if name in one]
+        told, of_logs = diagnosis_words.in_words(effect, name, [one[name] for one in every if name in one])
+        values = [one.value for one in of_logs]
         unit = "" if first.unit in ("-", "") else f" {first.unit}"
         digits = diagnosis_words.digits_of(first)
         low, high = f"{min(values):.{digits}f}", f"{max(values):.{digits}f}"
-        parts.append(f"{diagnosis_words.word(name)} {low if low == high else f'{low} to {high}'}{unit}")
+        parts.append(f"{told} {low if low == high else f'{low} to {high}'}{unit}")
     return "; ".join(parts)
 
 

@@ -51,7 +51,7 @@ def about(scope: CommonErrors) -> str:
     """Return how much there is to judge by."""
     length = f" of {scope.block_s:.3g} s" if isinstance(scope, LogErrors) else ""
     return (
-        f"{counted(scope.rows, 'row')}, {scope.seconds:.0f} s, {counted(scope.windows, 'window')}, "
+        f"{counted(scope.rows, 'row')}, {scope.seconds:.0f} s, {counted(scope.windows, 'overlapping window')}, "
         f"{counted(scope.blocks, 'block')}{length}, "
         f"{counted(scope.free_run.starts, 'free run')}"
     )

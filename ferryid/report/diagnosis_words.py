@@ -48,6 +48,11 @@ NAMES = {
     "growth": "strength at the end of the log over that at its start",
 }
 """Parameters whose own names are no words."""
+DELAYS = {
+    "clock_offset": ("the position after the velocity", "the velocity after the position"),
+    "time_delay": ("the navigation's data after the actuators'", "the actuators' data after the navigation's"),
+}
+"""Effects that are a delay of one signal after another: which, for a positive value and for a negative one."""
 
 
 def title(effect: str, instance: str | None = None) -> str:
@@ -129,15 +134,26 @@ def said(finding: Finding) -> str:
 
 def numbers(finding: Finding) -> str:
     """Return the parameters with intervals and units, as a sentence."""
-    told = numbers_of(finding.parameters)
+    told = numbers_of(finding.parameters, finding.effect)
     return (
         f"{told if next(iter(finding.parameters)) in COEFFICIENTS else _upper(told)} (95 % intervals)." if told else ""
     )
 
 
-def numbers_of(parameters: Mapping[str, Estimate]) -> str:
-    """Return parameters with intervals and units, one after the other."""
-    return "; ".join(f"{word(name)} {estimate(one)}" for name, one in parameters.items())
+def numbers_of(parameters: Mapping[str, Estimate], effect: str = "") -> str:
+    """Return parameters of an effect with intervals and units, one after the other."""
+    every = [in_words(effect, name, [one]) for name, one in parameters.items()]
+    return "; ".join(f"{name} {estimate(one)}" for name, (one,) in every)
+
+
+def in_words(effect: str, name: str, every: Sequence[Estimate]) -> tuple[str, list[Estimate]]:
+    """Return the name of a parameter of some logs, and its values: delays say what is late, and are positive then."""
+    if name != "seconds" or effect not in DELAYS:
+        return word(name), list(every)
+    positive, negative = DELAYS[effect]
+    if any(one.value >= 0.0 for one in every):
+        return f"delay of {positive}", list(every)
+    return f"delay of {negative}", [Estimate(-one.value, -one.high, -one.low, one.unit) for one in every]
 
 
 def estimate(one: Estimate) -> str:

@@ -171,7 +171,7 @@ def resolved(pair: Pair) -> str:
 
 
 def _row(likeness: Likeness, pair: Pair) -> dict[str, str]:
-    between = separation(pair.first, pair.second, likeness.setting)
+    between = separation(pair.first, pair.second, likeness.circumstances)
     return {
         "names": names(likeness, pair),
         "likeness": _value(pair),

@@ -102,7 +102,7 @@ def _scatter(one: Comparison) -> str:
 
 def _over(one: Comparison) -> str:
     logs = f" of {counted(one.logs, 'log')}" if one.logs > 1 else ""
-    return f"{counted(one.windows, 'window')}{logs}{', receive times' if one.clock == 'receive' else ''}"
+    return f"{counted(one.windows, 'overlapping window')}{logs}{', receive times' if one.clock == 'receive' else ''}"
 
 
 def _passed_over(sources: SecondSources) -> str:

@@ -112,7 +112,7 @@ class _Log:
     def too_short(self) -> str:
         """Why nothing can be fitted; empty where it can."""
         found = len(self.windows.starts)
-        return f"only {counted(found, 'stretch')} without a gap" if found < self.fewest_windows else ""
+        return f"only {counted(found, 'overlapping window')} without a gap" if found < self.fewest_windows else ""
 
 
 def _sensor_oracles() -> dict[str, Callable[[Measurements], SensorEstimate]]:

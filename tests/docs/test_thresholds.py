@@ -178,6 +178,7 @@ NO_DECISION = {
         identify.block_sum_store _VELOCITIES
         identify.excitation SECTORS
         identify.fit_warnings MOST_LOGS_SAID
+        identify.sign_changes MOST_NAMED
         identify.gusts _PROBES MANY_WINDOWS
         identify.weak_archive _AT_A_TIME
         identify.log_conditions _SAMPLES _START_WINDOWS

@@ -114,8 +114,18 @@ def test_what_makes_no_sense_is_refused(run: Run, tmp_path: Path) -> None:
         ("components", SETTINGS, {"windows_s": (4.0,)}, "--windows: .*Fix: give --weak-window, or sweep both"),
         ("window", SETTINGS, {"windows_s": (0.1, 4.0)}, "--weak-window: 0.1 s is no window of the weak form. Fix: "),
         ("window", SETTINGS, {"windows_s": (8.0,)}, "nothing to compare, as only windows of 8 s .*Fix: "),
-        ("window", SETTINGS, {"windows_s": (8.0, 60.0)}, "needs 12 windows of 60 s .* in a fold. Fix: give shorter"),
-        ("components", replace(SETTINGS, weak_window_s=60.0), {}, "needs 12 windows of 60 s .* in a fold. Fix: "),
+        (
+            "window",
+            SETTINGS,
+            {"windows_s": (8.0, 60.0)},
+            "needs 12 overlapping windows of 60 s .* in a fold. Fix: give shorter",
+        ),
+        (
+            "components",
+            replace(SETTINGS, weak_window_s=60.0),
+            {},
+            "needs 12 overlapping windows of 60 s .* in a fold. Fix: ",
+        ),
         ("both", replace(SETTINGS, residual="commanded"), {}, "--residual commanded: the weak form .*Fix: "),
         ("both", SETTINGS, {"folds": 1}, "--folds: 1 .*Fix: "),
     ):
@@ -134,7 +144,10 @@ def test_what_makes_no_sense_is_refused(run: Run, tmp_path: Path) -> None:
 def test_usual_lengths_that_do_not_fit_are_left_out_and_said(run: Run) -> None:
     found = run("window", [measured(1, seconds=100.0)], replace(SETTINGS, components=6))
     assert found.windows_s == (2.0, 4.0, 8.0)
-    assert any(note.startswith("A window of 16 s was left out: the weak form needs 12 windows") for note in found.notes)
+    assert any(
+        note.startswith("A window of 16 s was left out: the weak form needs 12 overlapping windows")
+        for note in found.notes
+    )
 
 
 @pytest.mark.slow
@@ -164,7 +177,7 @@ def test_auto_sweeps_what_a_fit_uses(run: Run, opened: Opened, noise: float, jit
     [
         (240.0, 0.15, {}, {"windows_s": (0.5, 1.0)}, "as --windows are its smoothing windows; --estimator weak takes"),
         (240.0, 0.15, {"residual": "commanded"}, {}, "as a fit uses it: the weak form explains the measured force"),
-        (120.0, 0.15, {}, {}, "as a fit uses it: the weak form needs 12 windows of 8 s"),
+        (120.0, 0.15, {}, {}, "as a fit uses it: the weak form needs 12 overlapping windows of 8 s"),
         (30.0, 0.0, {}, {}, "as a fit cannot compare the two: .*too short for three blocks"),
     ],
 )

@@ -13,10 +13,11 @@ from ferryid.diagnose.judging.diagnosis import Diagnosis, Withheld
 from ferryid.diagnose.judging.finding import Estimate
 from ferryid.diagnose.judging.hidden_gain import HiddenGain
 from ferryid.diagnose.judging.hidden_signal import with_gains
+from ferryid.report.campaign import _sizes
 from ferryid.report.diagnosis_page import as_text
 from ferryid.report.diagnosis_report import as_json, report
 from ferryid.report.diagnosis_timeline import timelines
-from ferryid.report.diagnosis_words import estimate, title
+from ferryid.report.diagnosis_words import estimate, numbers_of, title
 from tests.report.test_diagnosis import conforms, diagnosis, gain, wind
 
 SHARED = "thruster1 gives 85 % of the force that its speed promises."
@@ -145,3 +146,23 @@ def test_a_number_without_an_interval_is_told_once() -> None:
     assert estimate(Estimate(15.0, 15.0, 15.0, "-")) == "15"
     assert estimate(Estimate(0.25, 0.25, 0.25, "s")) == "0.250 s"
     assert estimate(Estimate(0.25, 0.2, 0.3, "s")) == "0.25 s (0.20 to 0.30)"
+
+
+@pytest.mark.parametrize(
+    ("effect", "seconds", "told"),
+    [
+        ("clock_offset", (-0.8, -0.5), "delay of the velocity after the position 0.50 to 0.80 s"),
+        ("clock_offset", (0.8, 0.5), "delay of the position after the velocity 0.50 to 0.80 s"),
+        ("time_delay", (-0.1, -0.1), "delay of the actuators' data after the navigation's 0.10 s"),
+        ("time_delay", (-0.1, 0.3), "delay of the navigation's data after the actuators' -0.10 to 0.30 s"),
+    ],
+)
+def test_a_delay_says_what_is_late(effect: str, seconds: tuple[float, float], told: str) -> None:
+    late = [{"seconds": Estimate(one, one - 0.11, one + 0.12, "s")} for one in seconds]
+    assert _sizes(effect, late) == told
+
+
+def test_a_delay_of_one_log_has_its_interval_the_right_way_round() -> None:
+    late = {"seconds": Estimate(-0.8, -0.87, -0.76, "s")}
+    assert numbers_of(late, "clock_offset") == "delay of the velocity after the position 0.80 s (0.76 to 0.87)"
+    assert numbers_of(late, "payload") == "delay -0.80 s (-0.87 to -0.76)"

@@ -50,7 +50,7 @@ def test_the_page_lists_instruments_and_repairs() -> None:
     page, _ = render((replace(diagnosis("explained"), sources=FOUND, repairs=(SPIKES,)),), "trial")
     for shown in ("Other instruments in the log", PLACE.says, "/nav/pose x, y", "0.069 m", WITNESS.says, SPIKES):
         assert shown in page
-    assert "233 windows of 2 logs, receive times" in page
+    assert "233 overlapping windows of 2 logs, receive times" in page
     assert "does not follow the mapped signal (97 %" in page
     assert "Passed over: 1 signal (never changes)." in page
 

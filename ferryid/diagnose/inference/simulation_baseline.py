@@ -100,7 +100,7 @@ def learn_simulation(path: str, profile: Profile, run: RunContext = IN_MEMORY) -
     if len(simulated_windows.starts) < INFERENCE.fewest_windows:
         raise FerryIdError(
             f"{name}: --against needs a simulation long enough to learn its model from, found "
-            f"{counted(len(simulated_windows.starts), 'stretch')} of "
+            f"{counted(len(simulated_windows.starts), 'overlapping window')} of "
             f"{window_lengths(profile)[0]:.0f} s without a gap where {INFERENCE.fewest_windows} are needed. "
             "Fix: simulate and record the whole trial"
         )

@@ -6,10 +6,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, without
+from ferryid.diagnose.inference.onset_estimation import is_brief
 from ferryid.diagnose.inference.search import is_negligible, prune
 from ferryid.diagnose.judging.axis_consistency import check_axis_consistency
+from ferryid.diagnose.judging.credibility import interval_doubt
 from ferryid.diagnose.judging.held_out import HeldOutEvidence, held_out_evidence
 from ferryid.diagnose.judging.rivals import RivalComparison, compare_rivals
+from ferryid.diagnose.judging.size_estimates import size_estimates
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.judging.unexplained import find_displaced
 from ferryid.effects.wording import listed
@@ -18,6 +21,7 @@ PLACEBO = (
     "a placebo (the same force at other times, or on mirrored headings) does as well on stretches kept from the fit"
 )
 INCONSISTENT = "on an axis where it would have to act, most of it is missing"
+BRIEF = "it acts for less time than held-out data can judge, and its 95 % interval includes no effect at all"
 LAW = "an empirical law of the motion explains more in that place, and leaves nothing to explain"
 
 
@@ -106,9 +110,22 @@ def _fallen(problem: EstimationProblem, kept: Fit, proof: HeldOutEvidence | None
     idle = [i for i in range(len(kept.candidates)) if is_negligible(problem, kept, i)]
     if idle:
         return idle[0], ""
+    # Whatever came just then would do as well: neither its size nor stretches kept from the fit show that it is this.
+    unsized = [i for i in range(len(kept.candidates)) if _is_brief_and_unsized(problem, kept, i)]
+    if unsized:
+        return unsized[0], BRIEF
     inconsistent = [i for i in range(len(kept.candidates)) if check_axis_consistency(problem, kept, i).inconsistent]
     if inconsistent:
         return inconsistent[0], INCONSISTENT
     # Physics without a name here may look a little like an effect.
     imitated = find_displaced(problem, kept)
     return (imitated[0], LAW) if imitated else (None, "")
+
+
+def _is_brief_and_unsized(problem: EstimationProblem, kept: Fit, i: int) -> bool:
+    """Tell whether a candidate acts too briefly to be judged, and may as well be nothing."""
+    candidate = kept.candidates[i]
+    if not is_brief(problem, candidate):
+        return False
+    estimates = size_estimates(problem, kept, i)
+    return bool(interval_doubt(candidate.parameters, estimates, kept.covariance(i)))

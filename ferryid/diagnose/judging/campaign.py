@@ -82,7 +82,7 @@ class JudgedCampaign:
     @property
     def notes(self) -> tuple[str, ...]:
         """What was tested over all logs, as sentences."""
-        return tuple(note(one, len(self.hull.place)) for one in self.conditions.tests)
+        return tuple(note(one, self.hull.place) for one in self.conditions.tests)
 
     def claims(self, path: str) -> tuple[Claim, ...]:
         """Return what all logs together say of one of them, as findings."""

@@ -15,6 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import exp
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -47,6 +48,7 @@ from ferryid.effects import effects
 from ferryid.effects.effect import Parameter
 from ferryid.effects.wording import listed, weak_evidence
 from ferryid.types import AXES, Floats
+from ferryid.vessel.circumstances import Circumstances
 
 
 @dataclass(frozen=True)
@@ -413,7 +415,9 @@ def _finding(test: ConditionTest, i: int, tests: tuple[ConditionTest, ...]) -> F
             if one.effect not in (test.effect, *test.beside)
         ),
         unresolved_with=test.unresolved,
-        separating_manoeuvre=manoeuvre(test.effect, test.unresolved, errors.windows.measurements.profile.setting),
+        separating_manoeuvre=manoeuvre(
+            test.effect, test.unresolved, Circumstances.of(errors.windows.measurements.profile)
+        ),
         says=says,
         course=test.courses[i] if test.courses else None,
         **_figure(test, i, errors, shares, value),
@@ -448,8 +452,9 @@ def _improvement(test: ConditionTest) -> Floats:
     return np.asarray(1.0 - after / np.where(before > 0.0, before, np.inf))
 
 
-def note(test: ConditionTest, logs: int) -> str:
-    """Return what was tested, as a sentence."""
+def note(test: ConditionTest, place: Mapping[str, int]) -> str:
+    """Return what was tested, in sentences; `place` is which of the logs of the fit each path is."""
+    logs = len(place)
     title, found = effects()[test.effect].title, "confirmed" if test.confirmed else "not confirmed"
     have = sum(any(each.effect.id == test.effect for each in one.conditions) for one in test.fit.campaign.members)
     whose = "each log" if have == logs else f"{have} of {counted(logs, 'log')}"
@@ -459,9 +464,27 @@ def note(test: ConditionTest, logs: int) -> str:
         f"{title} of {whose}, estimated with one hull for all {logs}{beside}: {found}. "
         f"Over none, evidence {test.evidence:+.0f} nat, likelihood of held-out stretches {_range(test.gain)}"
     )
-    for place, one in test.placebos.items():
-        told += f"; over one on {place}, evidence {one.evidence:+.0f} nat, held out {_range(one.gain)}"
-    return f"{told}."
+    for where, one in test.placebos.items():
+        told += f"; over one on {where}, evidence {one.evidence:+.0f} nat, held out {_range(one.gain)}"
+    return f"{told}.{_where_worse(test, place)}"
+
+
+def _where_worse(test: ConditionTest, place: Mapping[str, int]) -> str:
+    """Return where held-out stretches are predicted worse with a condition, if they surely are, and why they may be."""
+    if test.gain.high >= 0.0:
+        return ""
+    loss = test.loss[1]
+    gains = loss.gain(test.loss[0])
+    worst = min(place, key=lambda path: float(gains[loss.log == place[path]].sum()))
+    lost = float(gains[loss.log == place[worst]].sum())
+    told = f" Those stretches are predicted worse with it, most in {Path(worst).name} ({lost:+.0f} nat)."
+    if np.count_nonzero(loss.log == place[worst]) == 1:
+        title = effects()[test.effect].title.lower()
+        told += (
+            f" It is so short that it is held out as a whole: its own {title} is not known then, and "
+            "all that follows from that counts as error, in squares of the noise."
+        )
+    return told
 
 
 def _range(gain: Gain) -> str:

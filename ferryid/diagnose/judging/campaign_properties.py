@@ -28,6 +28,7 @@ from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.wording import weak_evidence
 from ferryid.side_by_side import over
 from ferryid.types import AXES, Floats
+from ferryid.vessel.circumstances import Circumstances
 
 
 @dataclass(frozen=True)
@@ -160,7 +161,7 @@ class PropertyTest:
             held_out=True,
             rivals=self.rivals,
             unresolved_with=unresolved,
-            separating_manoeuvre=manoeuvre(effect.id, unresolved, windows.measurements.profile.setting),
+            separating_manoeuvre=manoeuvre(effect.id, unresolved, Circumstances.of(windows.measurements.profile)),
             says=says,
             evidence={"t": windows.middle_s},
         )

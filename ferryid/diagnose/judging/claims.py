@@ -9,6 +9,7 @@ from typing import Literal
 
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.judging.finding import Finding
+from ferryid.vessel.circumstances import ANYWHERE, Circumstances
 
 Key = tuple[str, str | None]
 """Effect and instance."""
@@ -120,8 +121,8 @@ class LogFigures:
         Lasting properties that most logs of the campaign can show, were weighed for together, and do not confirm.
     baseline_sensors
         Sensor errors that the simulation has which the log is compared with: parameters by effect.
-    setting
-        Where it was recorded; empty where that is not known.
+    circumstances
+        Where it was recorded, and what drives the vessel.
     hull_doubt, common_hull_doubt
         Why the hull that was refitted to the log, and the one that was fitted to all logs of a campaign, cannot be the
         vessel's, as the end of a sentence; empty where they can.
@@ -136,7 +137,7 @@ class LogFigures:
     campaign: tuple[frozenset[Key], ...] = ()
     weighed: frozenset[Key] = frozenset()
     baseline_sensors: Mapping[str, Mapping[str, Estimate]] = field(default_factory=dict)
-    setting: str = ""
+    circumstances: Circumstances = ANYWHERE
     hull_doubt: str = ""
     common_hull_doubt: str = ""
     jumping: tuple[str, ...] = ()

@@ -15,6 +15,7 @@ from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted_force_model
 from ferryid.diagnose.inference.force_errors import force_errors, mass_of
 from ferryid.diagnose.inference.stages import AveragedLog, Baseline
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.campaign import JudgedCampaign
 from ferryid.diagnose.judging.campaign_posterior import campaign_posterior
@@ -40,6 +41,7 @@ from ferryid.diagnose.judging.locate import locate, locate_between
 from ferryid.diagnose.judging.posterior import Posterior, posterior_of
 from ferryid.diagnose.judging.verdict import Remainder, verdict_of
 from ferryid.types import AXES, Floats
+from ferryid.vessel.circumstances import Circumstances
 
 TEN_MINUTES = {
     "": "Record at least ten minutes that excite every axis.",
@@ -129,18 +131,25 @@ def _too_short(
     together: JudgedCampaign | None,
 ) -> Diagnosis:
     screened = log.screened
-    setting = screened.measurements.profile.setting
-    figures = replace(shared, joint=baseline.joint, baseline_sensors=baseline.sensors, setting=setting)
+    where = Circumstances.of(screened.measurements.profile)
+    figures = replace(
+        shared,
+        joint=baseline.joint,
+        baseline_sensors=baseline.sensors,
+        circumstances=where,
+    )
     findings, notes = apply_rules(claims, figures)
     profile, window_s = screened.measurements.profile, _window_s(log.windows.weight, log.windows.measurements.step_s)
     # Bags of seconds are welcome in a campaign that they have a say in.
     advice = (
-        TEN_MINUTES.get(setting, TEN_MINUTES[""])
+        TEN_MINUTES.get(where.setting, TEN_MINUTES[""])
         if together is None or log.path not in together.hull.place
         else "What all logs say together of hull and properties holds for it too."
     )
-    short = f"Only {counted(len(log.windows.starts), 'stretch')} of {window_s:.0f} s without a gap: too few for a conclusion "
-    short += f"from this log alone. {advice}"
+    short = (
+        f"Only {counted(len(log.windows.starts), 'window')} of {window_s:.0f} s, which overlap, are without a gap, and "
+        f"{INFERENCE.fewest_windows} are needed: too few for a conclusion from this log alone. {advice}"
+    )
     remainder = Remainder(testable=False)
     errors = None if together is None else together.errors(log.path, findings)
     before, after = ({}, {}) if errors is None else errors.scores(window_s)
@@ -206,7 +215,7 @@ def _concluded(
         *rule_notes,
         *log_notes(figures),
         *untested_notes(selected.search.untested),
-        *recording_advice(chances, still, measurements.profile.setting),
+        *recording_advice(chances, still, log.figures.circumstances),
     )
     return Diagnosis(
         survey.used.log,

@@ -290,7 +290,7 @@ def hull_from_this_log(finding: Finding, context: Context, _threshold: float) ->
     guessed = {"force": not context.log.joint, "disturbance": True}.get(context.own.kind, False)
     if context.log.hull_known or not guessed:
         return finding, ""
-    return lowered(finding, "hull_parameters", manoeuvre=fitting(HULL_FIRST, context.log.setting)), ""
+    return lowered(finding, "hull_parameters", manoeuvre=fitting(HULL_FIRST, context.log.circumstances)), ""
 
 
 @rule()
@@ -376,8 +376,8 @@ def out_of_step_beside_disturbance(finding: Finding, context: Context, threshold
     doubtful = context.log.unsteady and finding.effect in OUT_OF_STEP and not context.own.beyond_feedback
     if not doubtful or removes >= threshold:
         return finding, ""
-    here = context.log.setting
-    unsteady = "waves" if here in effects()["gusts"].absent_in else "gusts"
+    here = context.log.circumstances
+    unsteady = "waves" if here.setting in effects()["gusts"].absent_in else "gusts"
     return lowered(finding, unsteady, manoeuvre=fitting(CALM, here)), ""
 
 

@@ -21,23 +21,19 @@ from ferryid.diagnose.inference.estimation import (
     fitted_force_model,
 )
 from ferryid.diagnose.inference.thresholds import INFERENCE
-from ferryid.diagnose.judging.experiment_design import shown_by
+from ferryid.diagnose.judging.experiment_design import excited_by, shown_by
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.effects.wording import listed, titled
 from ferryid.types import Floats
+from ferryid.vessel.circumstances import ANYWHERE, Circumstances
 
 AXES = {
     axis: tuple(k for k, name in enumerate(COEFFICIENTS) if name.startswith(begins))
     for axis, begins in (("surge", ("m1", "X_")), ("sway", ("m2", "Y_")), ("yaw", ("m3", "N_")))
 }
 """Places of each axis's coefficients in the hull's."""
-EXCITES = {
-    "surge": "accelerations from rest to full speed and back, ahead and astern",
-    "sway": "moves sideways to both sides, from rest and back to rest",
-    "yaw": "turns on the spot both ways, at several rates",
-}
 HULL = "hull_parameters"
 """What a log tells of the hull's coefficients is told by axis."""
 
@@ -159,19 +155,21 @@ def is_testable(every: Sequence[DetectionPower], axes: Sequence[str]) -> bool:
     return 2 * sum(one.chance >= JUDGING.detection_chance for one in every) > len(every) and len(axes) < len(AXES)
 
 
-def recording_advice(every: Sequence[DetectionPower], axes: Sequence[str], setting: str = "") -> list[str]:
-    """Return what a log from some setting could not show, and what to record next, in sentences; each thing once."""
+def recording_advice(
+    every: Sequence[DetectionPower], axes: Sequence[str], where: Circumstances = ANYWHERE
+) -> list[str]:
+    """Return what a log of some vessel and place could not show, and what to record next, in sentences; each thing once."""
     sentences = []
     if axes:
         what = " and ".join(axes)
         sentences.append(
             f"The vessel was hardly moved in {what}: the hull cannot be identified there. "
-            f"To excite {'it' if len(axes) == 1 else 'them'}, record {'; '.join(EXCITES[axis] for axis in axes)}."
+            f"To excite {'it' if len(axes) == 1 else 'them'}, record {'; '.join(excited_by(axis, where) for axis in axes)}."
         )
     by_manoeuvre: dict[str, dict[str, list[str]]] = {}
     for one in every:
         if one.chance < JUDGING.detection_chance:
-            known = by_manoeuvre.setdefault(shown_by(one.candidate.effect.id, setting), {})
+            known = by_manoeuvre.setdefault(shown_by(one.candidate.effect.id, where), {})
             known.setdefault(one.candidate.effect.title.lower(), []).extend(filter(None, [one.candidate.instance]))
     if by_manoeuvre:
         parts = [

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 
 from ferryid.effects import effects
+from ferryid.vessel.circumstances import ANYWHERE, Circumstances, Drive
 
 CALM = "the same manoeuvres in calm air"
 """What shows a delay or a lag that a controller's answer to gusts looks like."""
@@ -172,6 +173,12 @@ SENSORS = {
     "yaw_rate_scale": "a second gyro",
 }
 """What measures an effect itself, or what it depends on."""
+EXCITES = {
+    "surge": "accelerations from rest to full speed and back, ahead and astern",
+    "sway": "moves sideways to both sides, from rest and back to rest",
+    "yaw": "turns on the spot both ways, at several rates",
+}
+"""What moves a vessel in each axis."""
 OTHERWISE = "a calibration run that excites every axis at many headings"
 
 
@@ -202,25 +209,67 @@ FITTING: dict[str, tuple[tuple[str, str], ...]] = {
 """By setting, what advice for anywhere becomes there: what the place does not have is not asked for."""
 
 
-def fitting(advice: str, setting: str) -> str:
-    """Return advice as it fits a setting of `ferryid.vessel.profile.SETTINGS`; as it stands where that is not known."""
-    for general, there in FITTING.get(setting, ()):
+def phrases_of(drive: Drive) -> Iterator[tuple[str, str]]:
+    """Yield what advice for several thrusters that turn and push every way becomes for a drive, in the order of replacement."""
+    if drive.rudder and drive.single:
+        yield SINGLE, "several speeds of the propeller, ahead and astern, each at several rudder angles"
+        yield "speed and angle from rest", "speed from rest, and of the rudder's angle with way on"
+    elif drive.rudder:
+        yield "at several speeds and angles", "at several speeds and rudder angles"
+        yield "speed and angle from rest", "speed from rest, and of the rudders' angle with way on"
+    elif not drive.turned:
+        yield "speeds and angles", "speeds"
+        yield "speed and angle", "speed"
+    if drive.single:
+        only = "propeller" if drive.rudder or not drive.turned else "thruster"
+        yield ", each thruster alone", ""
+        yield "each thruster alone, at", f"the {only} at"
+        yield "each thruster alone", f"the {only}"
+        yield "each thruster's angle", "the rudder's angle" if drive.rudder else f"the {only}'s angle"
+        yield "each thruster's", f"the {only}'s"
+        yield "the thrusters'", f"the {only}'s"
+        yield "the thrusters off", f"the {only} stopped"
+        yield "navigation and thrusters", f"navigation and {only}"
+    if not drive.sideways:
+        yield ", ahead and sideways", ""
+        yield "moves sideways to both sides, from rest and back to rest", "hard turns to both sides at several speeds"
+        yield "station keeping", "slow runs"
+        yield "at the same headings", "on the same headings"
+    if not drive.on_the_spot:
+        yield "a slow turn on the spot", "a slow turn"
+        yield "turns on the spot at many rates, without way on", "turns at many rates, at low and at high speed"
+        yield "turns on the spot both ways, at several rates", "turns both ways, at several rates"
+
+
+def fitting(advice: str, where: Circumstances) -> str:
+    """Return advice as it fits a setting and a drive; as it stands where neither is known.
+
+    What the place does not have, or the vessel cannot do, is not asked for.
+    """
+    for general, there in (*FITTING.get(where.setting, ()), *phrases_of(where.drive)):
         advice = advice.replace(general, there)
     return advice
 
 
-def shown_by(effect: str, setting: str = "") -> str:
-    """Return what a log from some setting has to hold to show an effect by itself."""
-    return fitting(SHOWS.get(effect, OTHERWISE), setting)
+def shown_by(effect: str, where: Circumstances = ANYWHERE) -> str:
+    """Return what a log from some place and vessel has to hold to show an effect by itself."""
+    return fitting(SHOWS.get(effect, OTHERWISE), where)
 
 
-def sensor_of(effect: str, setting: str = "") -> str:
+def excited_by(axis: str, where: Circumstances = ANYWHERE) -> str:
+    """Return what moves a vessel in an axis."""
+    return fitting(EXCITES[axis], where)
+
+
+def sensor_of(effect: str, where: Circumstances = ANYWHERE) -> str:
     """Return what measures an effect; empty where nothing does, or the setting does not have it."""
     known = effects().get(effect)
-    return "" if known is not None and setting in known.absent_in else SENSORS.get(effect, "")
+    if known is not None and where.setting in known.absent_in:
+        return ""
+    return fitting(SENSORS.get(effect, ""), where)
 
 
-def manoeuvre(effect: str, rivals: Collection[str], setting: str = "") -> str | None:
+def manoeuvre(effect: str, rivals: Collection[str], where: Circumstances = ANYWHERE) -> str | None:
     """Return what to record to tell an effect from its rivals; None where there is nothing to tell apart.
 
     A pair without a manoeuvre of its own is told apart by what shows the one and what shows the other.
@@ -232,4 +281,4 @@ def manoeuvre(effect: str, rivals: Collection[str], setting: str = "") -> str | 
     for rival in rivals:
         pair = frozenset({effect, rival})
         manoeuvres += [known[pair]] if pair in known else [SHOWS.get(one, OTHERWISE) for one in (effect, rival)]
-    return fitting("; ".join(dict.fromkeys(manoeuvres)), setting)
+    return "; ".join(dict.fromkeys(fitting(one, where) for one in manoeuvres))

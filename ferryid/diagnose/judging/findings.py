@@ -21,7 +21,6 @@ from ferryid.diagnose.inference.estimation import (
 from ferryid.diagnose.inference.feedback import OUT_OF_STEP, feedback_of
 from ferryid.diagnose.inference.folds import block_s
 from ferryid.diagnose.inference.onset_estimation import lasts_s, replace_candidate
-from ferryid.diagnose.inference.profile_likelihood import intervals
 from ferryid.diagnose.judging.backward_elimination import Elimination
 from ferryid.diagnose.judging.claims import Claim, Figures
 from ferryid.diagnose.judging.credibility import interval_doubt, value_doubt
@@ -32,9 +31,11 @@ from ferryid.diagnose.judging.held_out import Proof
 from ferryid.diagnose.judging.locate import locate
 from ferryid.diagnose.judging.motion_evidence import beyond_any_hull
 from ferryid.diagnose.judging.onset_evidence import sets_in
+from ferryid.diagnose.judging.size_estimates import size_estimates
 from ferryid.diagnose.judging.time_posterior import TimePosterior
 from ferryid.effects.force_model import Measurements
 from ferryid.types import AXES, Floats
+from ferryid.vessel.circumstances import Circumstances
 
 TIME_FIT = 3
 """Steps of the fit for each time that an effect may have begun or ended at."""
@@ -115,7 +116,7 @@ def _force_claim(
         held_out=proof is not None,
         rivals=rivals,
         unresolved_with=unresolved,
-        separating_manoeuvre=manoeuvre(candidate.effect.id, unresolved, measurements.profile.setting),
+        separating_manoeuvre=manoeuvre(candidate.effect.id, unresolved, Circumstances.of(measurements.profile)),
         says=candidate.effect.says(reported, candidate.instance) if reported else "",
         **figure_columns(
             problem, place, figure_regressor(candidate, fitted_force_model(problem.plain, bare), values, place)
@@ -194,20 +195,7 @@ def removed_shares(problem: EstimationProblem, stands: Elimination) -> dict[tupl
 
 
 def _estimates(problem: EstimationProblem, candidate: Candidate, kept: Fit, index: int) -> dict[str, Estimate]:
-    error = kept.reported_errors(index)
-    estimates = {}
-    unreported = candidate.effect.unreported(problem.plain.measurements, kept.values[index])
-    followed = intervals(problem, kept, index) if candidate.effect.profiled and not candidate.times else {}
-    for parameter, value, spread in zip(candidate.parameters, kept.values[index].tolist(), error.tolist(), strict=True):
-        low, high = max(value - 1.96 * spread, parameter.low), min(value + 1.96 * spread, parameter.high)
-        if parameter.name in followed:
-            low, high = min(followed[parameter.name][0], value), max(followed[parameter.name][1], value)
-        least = candidate.effect.minimum_change
-        if parameter.name in unreported:
-            continue
-        if least > 0.0 and low < parameter.neutral + least and high > parameter.neutral - least:
-            continue
-        estimates[parameter.name] = Estimate(value, low, high, parameter.unit)
+    estimates = size_estimates(problem, kept, index)
     for end in candidate.times:
         estimates[end.removesuffix("_s")] = _time(problem, kept, index, end)
     if candidate.effect.passing:

@@ -39,6 +39,7 @@ from ferryid.effects import effects
 from ferryid.effects.effect import Parameter
 from ferryid.effects.wording import listed, weak_evidence
 from ferryid.side_by_side import over
+from ferryid.vessel.circumstances import ANYWHERE, Circumstances
 from ferryid.vessel.profile import Profile
 
 
@@ -64,8 +65,8 @@ class Difference:
         What was tried in its place, with the evidence over it [nat].
     doubt
         Why it is not confirmed, as the end of a sentence; empty where it is.
-    setting
-        Where the logs were recorded; empty where that is not known.
+    circumstances
+        Where the logs were recorded, and what drives the vessel.
     """
 
     candidate: Candidate
@@ -77,7 +78,7 @@ class Difference:
     by_group: Mapping[str, Gain] | None = None
     rivals: tuple[Rival, ...] = ()
     doubt: str = ""
-    setting: str = ""
+    circumstances: Circumstances = ANYWHERE
 
     @property
     def group(self) -> str:
@@ -105,7 +106,7 @@ class Difference:
     @property
     def separating_manoeuvre(self) -> str | None:
         """What to record to separate it from these."""
-        return manoeuvre(self.candidate.effect.id, self.unresolved_with, self.setting)
+        return manoeuvre(self.candidate.effect.id, self.unresolved_with, self.circumstances)
 
     @property
     def says(self) -> str:
@@ -212,7 +213,7 @@ def _judged(made: CampaignFit, candidate: Candidate, contenders: Sequence[Conten
     by_group = {group: Gain.of(gains[groups == group]) for group in GROUPS}
     found = replace(found, gain=Gain.of(gains), by_group=by_group, rivals=_rivals(candidate, contenders))
     profile = made.campaign.members[0].plain.measurements.profile
-    found = replace(found, setting=profile.setting)
+    found = replace(found, circumstances=Circumstances.of(profile))
     return replace(found, doubt=_doubt(found, made.campaign.hull.known, profile))
 
 

@@ -21,6 +21,7 @@ from ferryid.diagnose.judging.unexplained import Unexplained, find_unexplained
 from ferryid.effects import effects
 from ferryid.side_by_side import over
 from ferryid.types import AXES
+from ferryid.vessel.circumstances import Circumstances
 from ferryid.vessel.profile import Profile
 
 
@@ -90,7 +91,7 @@ def _judged(
         velocity_noise=velocity_noise_shares(problem),
         unsteady=unknown.unsteady or bool(states),
         baseline_sensors=baseline.sensors,
-        setting=measurements.profile.setting,
+        circumstances=Circumstances.of(measurements.profile),
         hull_doubt=refitted_hull(problem, stands.fit, known=baseline.hull_known).doubt,
         jumping=log.estimated.averaged.screened.measured.survey.jumping,
     )

@@ -25,6 +25,7 @@ from ferryid.diagnose.judging.responses import ROUNDING, Key, Responses, has_res
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.types import Floats
+from ferryid.vessel.circumstances import ANYWHERE, Circumstances
 
 
 @dataclass(frozen=True)
@@ -99,14 +100,14 @@ class Likeness:
         Likeness of every two, in the same order, shape (n, n), ones on the diagonal.
     pairs
         Every two of them, the most alike first.
-    setting
-        Where the logs were recorded; empty where that is not known.
+    circumstances
+        Where the logs were recorded, and what drives the vessel.
     """
 
     effects: tuple[EffectVisibility, ...]
     matrix: Floats
     pairs: tuple[Pair, ...]
-    setting: str = ""
+    circumstances: Circumstances = ANYWHERE
 
     @property
     def alike(self) -> tuple[Pair, ...]:
@@ -150,7 +151,7 @@ def likeness(found: Responses) -> Likeness:
         if i < j
     ]
     pairs.sort(key=lambda pair: -pair.likeness)
-    return Likeness(tuple(effects), matrix, tuple(pairs), found.setting)
+    return Likeness(tuple(effects), matrix, tuple(pairs), found.circumstances)
 
 
 def cosine(across: Floats) -> float:
@@ -199,10 +200,10 @@ class Separation:
     sensor: str
 
 
-def separation(first: Key, second: Key, setting: str = "") -> Separation:
-    """Return what separates two effects in a setting."""
-    sensors = dict.fromkeys(sensor for effect, _ in (first, second) if (sensor := sensor_of(effect, setting)))
-    return Separation(manoeuvre(first[0], [second[0]], setting) or "", " or ".join(sensors))
+def separation(first: Key, second: Key, where: Circumstances = ANYWHERE) -> Separation:
+    """Return what separates two effects of some vessel in some place."""
+    sensors = dict.fromkeys(sensor for effect, _ in (first, second) if (sensor := sensor_of(effect, where)))
+    return Separation(manoeuvre(first[0], [second[0]], where) or "", " or ".join(sensors))
 
 
 def likeness_of_logs(
@@ -247,12 +248,12 @@ def likeness_as_json(found: Likeness) -> dict[str, Any]:
             }
             for one in found.effects
         ],
-        "pairs": [_pair_as_json(one, found.setting) for one in found.pairs],
+        "pairs": [_pair_as_json(one, found.circumstances) for one in found.pairs],
     }
 
 
-def _pair_as_json(pair: Pair, setting: str) -> dict[str, Any]:
-    between = separation(pair.first, pair.second, setting) if pair.alike else None
+def _pair_as_json(pair: Pair, where: Circumstances) -> dict[str, Any]:
+    between = separation(pair.first, pair.second, where) if pair.alike else None
     return {
         "effects": [{"effect": effect, "instance": instance} for effect, instance in (pair.first, pair.second)],
         "likeness": pair.likeness,

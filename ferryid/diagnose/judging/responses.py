@@ -19,6 +19,7 @@ from ferryid.effects.effect import HELD
 from ferryid.effects.force_model import ForceModel
 from ferryid.effects.wording import titled
 from ferryid.types import Floats
+from ferryid.vessel.circumstances import ANYWHERE, Circumstances
 
 Key = tuple[str, str | None]
 HULL = "hull_parameters"
@@ -43,8 +44,8 @@ class Responses:
         Prior standard deviations of the hull's coefficients, shape (26,), in which their columns are.
     products
         Shape (26 + q, 26 + q); the columns of effects are for a parameter of usual size.
-    setting
-        Where the logs were recorded; empty where that is not known.
+    circumstances
+        Where the logs were recorded, and what drives the vessel.
     """
 
     titles: Mapping[Key, str]
@@ -52,7 +53,7 @@ class Responses:
     parameters: tuple[tuple[Key, str], ...]
     hull_spread: Floats
     products: Floats
-    setting: str = ""
+    circumstances: Circumstances = ANYWHERE
 
     def with_hull_spread(self, spread: Floats) -> Responses:
         """Return the same with another prior of the hull; a coefficient that could not move before still cannot."""
@@ -108,8 +109,8 @@ def response_columns(
         parameters += [(candidate.key, name) for name in names]
         titles[candidate.key] = titled(candidate.effect.title, candidate.instance)
         errors[candidate.key] = candidate.effect.formula_error
-    setting = problem.plain.measurements.profile.setting
-    found = Responses(titles, errors, tuple(parameters), problem.hull_spread, np.zeros((0, 0)), setting)
+    where = Circumstances.of(problem.plain.measurements.profile)
+    found = Responses(titles, errors, tuple(parameters), problem.hull_spread, np.zeros((0, 0)), where)
     return found, np.column_stack(columns)
 
 
@@ -183,4 +184,4 @@ def together(every: Iterable[Responses], hull_spread: Floats | None = None) -> R
         total[np.ix_(places, places)] += one.with_hull_spread(spread).products
     titles = {key: title for one in parts for key, title in one.titles.items()}
     errors = {key: error for one in parts for key, error in one.errors.items()}
-    return Responses(titles, errors, tuple(names), spread, total, parts[0].setting)
+    return Responses(titles, errors, tuple(names), spread, total, parts[0].circumstances)

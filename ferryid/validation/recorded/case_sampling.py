@@ -168,7 +168,7 @@ def check_length(recording: Recording, logs: Sequence[RecordedLog]) -> None:
     if found < INFERENCE.fewest_windows:
         raise FerryIdError(
             f"{recording.logs[0]}: too short for a diagnosis, found {logs[0].duration_s:.0f} s with "
-            f"{counted(found, 'stretch')} without a gap, and {INFERENCE.fewest_windows} are needed. "
+            f"{counted(found, 'overlapping window')} without a gap, and {INFERENCE.fewest_windows} are needed. "
             "Fix: give a longer recording, or several as a campaign"
         )
 

@@ -9,7 +9,7 @@ import pytest
 
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, fit, starting_point
 from ferryid.diagnose.inference.search import list_candidates, search
-from ferryid.diagnose.judging.backward_elimination import LAW, PLACEBO, _fallen, _told, eliminate_backward
+from ferryid.diagnose.judging.backward_elimination import BRIEF, LAW, PLACEBO, _fallen, _told, eliminate_backward
 from tests.diagnose.trials import sailed, trial_on
 
 pytestmark = pytest.mark.slow
@@ -102,3 +102,18 @@ def test_what_is_too_small_to_matter_falls_without_a_word(problem: EstimationPro
     for one, falls in ((loss, (None, "")), (careless, (0, ""))):
         both = fit(problem, [one, first])
         assert _fallen(problem.with_noise_of(both), both, None) == falls
+
+
+def test_what_is_too_brief_to_be_judged_and_may_be_nothing_falls(problem: EstimationProblem) -> None:
+    """A wind of 5 m/s, known to 4 m/s and to 0.4 m/s, for 30 s; and throughout the log, of which stretches can be kept."""
+    loss, wind = of(problem, LOSS, ("wind", None))
+    brief = {"onset_s": 200.0, "offset_s": 230.0}
+    right = fit(problem, [loss])
+    values = (*right.values, np.array([4.0, 3.0, 1.0, 1.0, 1.0]))
+    for one, error, falls in (
+        (replace(wind, **brief), 4.0, True),
+        (replace(wind, **brief), 0.4, False),
+        (wind, 4.0, False),
+    ):
+        blown = Fit((loss, one), values, np.diag([0.01, *5 * [error]]) ** 2, right.hull, right.evidence)
+        assert (_fallen(problem.with_noise_of(right), blown, None)[1] == BRIEF) == falls

@@ -44,6 +44,7 @@ from ferryid.diagnose.judging.confidence_rules import (
 )
 from ferryid.diagnose.judging.finding import UNKNOWN, Finding, LawTerm
 from ferryid.diagnose.judging.thresholds import JUDGING
+from ferryid.vessel.circumstances import Circumstances
 from tests.diagnose.judging.findings import found
 
 
@@ -266,7 +267,7 @@ def test_a_force_is_a_hint_where_only_the_log_itself_tells_of_the_hull(
     assert judged.probability == 0.2
     assert judged.unresolved_with == ("current", "hull_parameters")
     assert judged.separating_manoeuvre == "a log in calm air and still water, to fit a hull model first"
-    tank = LogFigures(hull_known=False, setting="tank")
+    tank = LogFigures(hull_known=False, circumstances=Circumstances("tank"))
     judged, _ = hull_from_this_log(found("payload", 0.2), Context(Figures("force"), tank))
     assert judged is not None
     assert judged.separating_manoeuvre == "further logs with the water at rest, to fit a hull model first"
@@ -314,7 +315,7 @@ def test_what_a_controllers_answer_looks_like_is_a_hint_beside_gusts(effect: str
     assert judged is not None
     assert ("gusts" in judged.unresolved_with) != sure
     for setting, beside, how in (("tank", "waves", "the water at rest"), ("sea", "gusts", "calm day")):
-        there = replace(context(0.3), log=LogFigures(unsteady=True, setting=setting))
+        there = replace(context(0.3), log=LogFigures(unsteady=True, circumstances=Circumstances(setting)))
         lower, _ = out_of_step_beside_disturbance(found(effect), there)
         assert lower is not None
         assert (beside in lower.unresolved_with and how in str(lower.separating_manoeuvre)) != sure
