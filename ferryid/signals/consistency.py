@@ -43,8 +43,9 @@ def cross_checks(track: Track) -> tuple[Doubt, ...]:
         speeds += _compare("sway velocity", "position", aside, SIGNALS.least_way_m, _SPEED_GAINS)
         if not any(doubt.certain for doubt in speeds):
             pose, velocity = (np.column_stack([columns[name] for name in names]) for names in (("x", "y", "psi"), "uv"))
-            _, says = mirrored(pose, velocity, track.valid, track.rate_hz)
-            speeds = [Doubt(says, True)] if says else speeds
+            wrong, says = mirrored(pose, velocity, track.valid, track.rate_hz)
+            frame = f"correct the frame of [signals.{wrong}], or of what it is compared with"
+            speeds = [Doubt(says, True, frame)] if says else speeds
         said += speeds
     return tuple(said)
 
@@ -58,6 +59,19 @@ _SPEED_GAINS = (
     (1 / 0.514444, "m/s look read as knots"),
     (1 / 3.6, "km/h look read as m/s"),
 )
+
+_SIGN_REMEDIES = {
+    "yaw rate": "one of them counts anticlockwise: change frame or sign in [signals.yaw_rate] or [signals.heading]",
+    "surge velocity": "the bow is taken for the stern: turn the heading by 180 deg with offset in [signals.heading] "
+    "(offset_deg of a quaternion), or correct the frame of [signals.velocity]",
+    "sway velocity": "its y axis is mirrored: take the other of FRD and FLU as frame in [signals.velocity], or correct the "
+    "frames of [signals.heading] and [signals.position]",
+}
+"""What explains a rate of the wrong sign, and where the profile says otherwise."""
+
+
+def _table(rate: str) -> str:
+    return "yaw_rate" if rate == "yaw rate" else "velocity"
 
 
 def comparable(track: Track) -> bool:
@@ -106,13 +120,15 @@ def _compare(rate: str, of: str, seen: _Changes, least: float, known: tuple[tupl
     certain = abs(correlation) > SIGNALS.certain_correlation
     if gain < 0:
         says = f"The {rate} has the wrong sign against the {of} ({numbers})" + (f", and {size}." if size else ".")
-        return [Doubt(says, certain)]
+        return [Doubt(says, certain, _SIGN_REMEDIES[rate])]
     if (low > 1.0 or high < 1.0) and abs(gain - 1.0) > SIGNALS.gain_error:
         remedy = size or (
             f"check the scale of the {rate} in the profile"
             + (", and the lever arm of what is measured away from the body origin" if of == "position" else "")
         )
-        return [Doubt(f"The {rate} does not match the {of} ({numbers}): {remedy}.", certain and bool(size))]
+        says = f"The {rate} does not match the {of} ({numbers}): {remedy}."
+        tables = f"[signals.{_table(rate)}] or [signals.{of}]"
+        return [Doubt(says, certain and bool(size), f"correct the unit in {tables}")]
     return []
 
 

@@ -122,7 +122,7 @@ def track_of(
         if doubt.certain:
             raise FerryIdError(
                 f"{recording.name}: signals contradict each other, so they cannot be used. {doubt.says} "
-                f"Fix: correct unit, frame or sign of the signal in the profile {profile.name}"
+                f"Fix: in the profile {profile.name}, {doubt.remedy}"
             )
     return Opened(recording, track, measure(track, profile))
 

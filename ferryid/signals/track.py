@@ -12,10 +12,14 @@ from ferryid.types import Flags, Floats
 
 @dataclass(frozen=True)
 class Doubt:
-    """A kinematic contradiction between signals: a sentence, and whether it is certain that one of them is wrong."""
+    """A kinematic contradiction between signals: a sentence, whether it is certain that one of them is wrong, and its remedy.
+
+    `remedy` is what to change in the profile, with the tables of the signals; empty where that is in the sentence.
+    """
 
     says: str
     certain: bool
+    remedy: str = ""
 
 
 @dataclass(frozen=True)

@@ -47,15 +47,36 @@ def anticlockwise(table: Table) -> None:
     ("edit", "parts"),
     [
         (exchanged, ("the yaw moment accelerates the vessel", "actuators are exchanged", "exchange the signals")),
-        (mirrored("v [m/s]"), ("contradict", "sway velocity has the wrong sign")),
+        (
+            mirrored("v [m/s]"),
+            (
+                "contradict",
+                "sway velocity has the wrong sign",
+                "the other of FRD and FLU as frame in [signals.velocity]",
+            ),
+        ),
         (mirrored("v [m/s]", "r [deg/s]"), ("contradict", "yaw rate has the wrong sign")),
         (
             # The whole motion is consistent, and its mirror image: the actuators alone show it.
             mirrored("v [m/s]", "r [deg/s]", "east [m]", "heading [deg]"),
             ("the sway force accelerates the vessel", "y axes that point to opposite sides", 'frame = "FLU"'),
         ),
-        (turned_round, ("contradict", "surge velocity has the wrong sign against the position")),
-        (anticlockwise, ("contradict", "yaw rate has the wrong sign against the heading")),
+        (
+            turned_round,
+            (
+                "contradict",
+                "surge velocity has the wrong sign against the position",
+                "turn the heading by 180 deg with offset in [signals.heading]",
+            ),
+        ),
+        (
+            anticlockwise,
+            (
+                "contradict",
+                "yaw rate has the wrong sign against the heading",
+                "counts anticlockwise: change frame or sign in [signals.yaw_rate] or [signals.heading]",
+            ),
+        ),
     ],
     ids=[
         "thrusters exchanged",
