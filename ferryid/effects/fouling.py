@@ -44,7 +44,12 @@ def cannot(measurements: Measurements) -> str:
 def says(values: Values, instance: str | None) -> str:
     """Return the finding as a sentence."""
     parts = ", ".join(f"{axis} {100.0 * (values[axis] - 1.0):+.0f} %" for axis in AXES)
-    return f"Damping at speed has changed ({parts}): the hull is fouled, or cleaner than the hull model."
+    told = f"Damping at speed has changed ({parts}): the hull is"
+    if all(values[axis] >= 1.0 for axis in AXES):
+        return f"{told} fouled."
+    if all(values[axis] <= 1.0 for axis in AXES):
+        return f"{told} cleaner than the hull model."
+    return f"{told} fouled, or cleaner than the hull model."
 
 
 def scenario(values: Values, instance: str | None) -> dict[str, Any]:

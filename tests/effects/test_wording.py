@@ -67,3 +67,16 @@ def test_lists_read_like_prose() -> None:
 )
 def test_weak_evidence_is_told_with_what_is_needed(evidence: float, told: str) -> None:
     assert weak_evidence(evidence, 8.0) == told
+
+
+@pytest.mark.parametrize(
+    ("factors", "told"),
+    [
+        ((1.78, 1.33, 1.0), "(surge +78 %, sway +33 %, yaw +0 %): the hull is fouled."),
+        ((0.7, 0.9, 0.8), "(surge -30 %, sway -10 %, yaw -20 %): the hull is cleaner than the hull model."),
+        ((1.5, 0.9, 1.2), "(surge +50 %, sway -10 %, yaw +20 %): the hull is fouled, or cleaner than the hull model."),
+    ],
+)
+def test_fouling_is_told_by_the_sign_of_what_changed(factors: tuple[float, float, float], told: str) -> None:
+    values = dict(zip(("surge", "sway", "yaw"), factors, strict=True))
+    assert effects()["fouling"].says(values, None) == f"Damping at speed has changed {told}"
