@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2, norm
+from scipy.special import chdtri, ndtri  # scipy.stats takes a third of a second to import
 
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit
@@ -175,10 +175,10 @@ def interval_doubt(
         ]
         # An interval that ends where nothing acts is cut there: its other end tells the error.
         half = np.array([max(one.high - one.value, one.value - one.low) for one in told])
-        away = norm.ppf(0.975) * (np.array([one.value for one in told]) - neutral) / np.maximum(half, 1e-300)
+        away = ndtri(0.975) * (np.array([one.value for one in told]) - neutral) / np.maximum(half, 1e-300)
         spread = np.sqrt(np.diag(covariance)[sized])
         alike = _given(covariance, sized, confined) / np.outer(spread, spread)
-        none = float(away @ np.linalg.solve(alike, away)) <= chi2.ppf(0.95, len(sized))
+        none = float(away @ np.linalg.solve(alike, away)) <= chdtri(len(sized), 0.05)
     return "its 95 % interval includes no effect at all" if none else ""
 
 

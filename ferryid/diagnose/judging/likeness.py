@@ -17,8 +17,6 @@ from math import sqrt
 from typing import Any
 
 import numpy as np
-from scipy.cluster.hierarchy import leaves_list, linkage
-from scipy.spatial.distance import squareform
 
 from ferryid.diagnose.judging.campaign import JudgedCampaign
 from ferryid.diagnose.judging.experiment_design import manoeuvre, sensor_of
@@ -184,6 +182,10 @@ def _order(matrix: Floats) -> list[int]:
     """Return the places of effects so that alike ones stand beside each other: average linkage, leaves in optimal order."""
     if len(matrix) < 3:
         return list(range(len(matrix)))
+    # A tenth of a second to import: only where there is something to order.
+    from scipy.cluster.hierarchy import leaves_list, linkage
+    from scipy.spatial.distance import squareform
+
     distance = np.sqrt(np.clip(1.0 - matrix**2, 0.0, 1.0))
     np.fill_diagonal(distance, 0.0)
     return [int(k) for k in leaves_list(linkage(squareform(distance, checks=False), "average", optimal_ordering=True))]
