@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from ferryid.side_by_side import usable_cores
+
 HEAVY = (
     "aiohttp", "apsw", "distributed", "google.protobuf", "jinja2", "llvmlite", "matplotlib", "mcap", "numba", "pandas",
     "pyarrow", "pyarrow.dataset", "pydantic", "rich", "rosbags", "rosbags.highlevel", "rosbags.rosbag2", "ruamel",
@@ -22,6 +24,8 @@ LOOPS = {"llvmlite", "numba", "scipy"}
 """numba looks for scipy, and needs its linear algebra only where a loop does."""
 ESTIMATES = {"scipy", "scipy.linalg", "scipy.special", "scipy.optimize", "scipy.spatial"}
 PAGES = {"matplotlib", "jinja2"}
+DRAWN_BESIDE = PAGES - {"matplotlib"} if usable_cores() > 1 else PAGES
+"""What makes a page whose figures a second process draws meanwhile."""
 LOG = "fixtures/short.mcap"
 VESSEL = ("--vessel", "milliampere")
 COMMANDS: dict[str, tuple[tuple[str, ...], set[str]]] = {
@@ -34,6 +38,10 @@ COMMANDS: dict[str, tuple[tuple[str, ...], set[str]]] = {
         ESTIMATES | KEEPS | PAGES,
     ),
     "evaluate": (("evaluate", "milliampere@1", LOG), ESTIMATES | KEEPS),
+    "diagnose": (
+        ("diagnose", LOG, *VESSEL),
+        ESTIMATES | KEEPS | LOOPS | READS | DRAWN_BESIDE | {"scipy.cluster"},
+    ),
     "compare": (("compare", "milliampere@1", "milliampere@2", "--on", LOG), ESTIMATES | KEEPS | PAGES),
     "sweep": (("sweep", "components", LOG, *VESSEL), ESTIMATES | KEEPS | PAGES),
     "models": (("models",), set()),

@@ -7,7 +7,6 @@ from math import atan2, degrees, hypot, isfinite
 from textwrap import fill, wrap
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 
 from ferryid.counts import counted
@@ -16,7 +15,7 @@ from ferryid.effects.wording import listed
 from ferryid.report import diagnosis_words, second_sources
 from ferryid.report.diagnosis_errors import fitted, ratio_of
 from ferryid.report.drawings import NONE, Drawings
-from ferryid.report.figures import MEASURED, NEW, STYLE, canvas, svg_text
+from ferryid.report.figures import MEASURED, NEW, canvas, styled, svg_text
 from ferryid.types import AXES
 
 FLOWS = ("wind", "current")
@@ -121,7 +120,7 @@ def flow_figure(diagnoses: Sequence[Diagnosis], effect: str) -> str:
     shown = [one for one in diagnoses if _finding(one, effect) or _withheld(one, effect)]
     if not any(_finding(one, effect) for one in shown):
         return ""
-    with mpl.rc_context(STYLE):
+    with styled():
         figure, axes = canvas(2, 4.6)
         for ax, name in zip(axes, COMPONENTS, strict=True):
             for k, one in enumerate(shown, 1):

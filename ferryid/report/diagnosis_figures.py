@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.ticker import FuncFormatter, NullLocator
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
@@ -19,19 +17,21 @@ from ferryid.report.figures import (
     MEASURED,
     NEW,
     SHADE,
-    STYLE,
     SYMBOLS,
     UNITS,
-    LogTicks,
     canvas,
     legend_above,
     plain_log,
+    styled,
     svg_text,
 )
 from ferryid.report.left_out import shade_left_out
 from ferryid.report.structure import envelope
 from ferryid.signals.track import LeftOut
 from ferryid.types import AXES, Floats
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 PROFILES = 4
 """Profiles that are drawn, the most telling ones; all are in the JSON."""
@@ -68,7 +68,7 @@ def spectral(finding: Finding) -> bool:
 def in_frequency(finding: Finding) -> str:
     """Draw the power spectrum of what was left over, and the one that a disturbance has by its parameters."""
     evidence = finding.evidence
-    with mpl.rc_context(STYLE):
+    with styled():
         figure, (ax,) = canvas(1, 3.4)
         ax.plot(evidence["frequency"], evidence["before"], color=BASE, label="left over")
         ax.plot(evidence["frequency"], evidence["explained"], color=MEASURED, linewidth=1.5, label=FOUND)
@@ -85,7 +85,7 @@ def in_frequency(finding: Finding) -> str:
 
 def over_time(course: Course, measured: MeasuredCourse | None = None) -> str:
     """Draw the components of a flow over time with their 95 % bands, beside what a withheld sensor measured."""
-    with mpl.rc_context(STYLE):
+    with styled():
         figure, axes = canvas(len(course.value), 1.9 * len(course.value) + 0.8)
         for ax, (name, value) in zip(axes, course.value.items(), strict=True):
             half = course.half(name)
@@ -104,7 +104,7 @@ def in_time(finding: Finding, left_out: Sequence[LeftOut] = ()) -> str:
     """Draw what was left over before and after a finding against time; when it acts is shaded, its ends marked."""
     evidence = finding.evidence
     t = evidence["t"]
-    with mpl.rc_context(STYLE):
+    with styled():
         figure, (ax,) = canvas(1, 3.4, top=0.55)
         for k, (first, last) in enumerate(finding.intervals):
             ax.axvspan(first, last, color=SHADE, linewidth=0, label="acts" if k == 0 else None)
@@ -132,7 +132,7 @@ def on_regressor(finding: Finding) -> str:
     ends = dict(finding.ends)
     acts = (evidence["t"] >= ends.get("onset", -np.inf)) & (evidence["t"] < ends.get("offset", np.inf))
     x, seen = x[acts], {name: values[acts] for name, values in evidence.items()}
-    with mpl.rc_context(STYLE):
+    with styled():
         figure, (ax,) = canvas(1, 3.2)
         for name, colour, label in (("before", BASE, WITHOUT), ("after", NEW, WITH)):
             ax.plot(x, seen[name], ".", color=colour, markersize=2.5, alpha=0.3, rasterized=True)
@@ -151,7 +151,7 @@ def on_regressor(finding: Finding) -> str:
 def left_over(diagnosis: Diagnosis) -> str:
     """Draw the force that was left over in the whole log, axis by axis, with onsets and offsets of what was found."""
     evidence = diagnosis.evidence
-    with mpl.rc_context(STYLE):
+    with styled():
         figure, axes = canvas(3, 5.2)
         for j, ax in enumerate(axes):
             shade_left_out(ax, diagnosis.left_out, evidence["t"][0], evidence["t"][-1])
@@ -172,7 +172,7 @@ def left_over(diagnosis: Diagnosis) -> str:
 def by_regime(diagnosis: Diagnosis, column: str, label: str) -> str:
     """Draw means of the force that was left over against heading or speed, with 95 % intervals, axis by axis."""
     evidence = diagnosis.evidence
-    with mpl.rc_context(STYLE):
+    with styled():
         figure, axes = canvas(3, 5.2)
         for j, ax in enumerate(axes):
             for name, colour in (("before", BASE), ("after", NEW)):
@@ -285,7 +285,7 @@ def in_regime(diagnosis: Diagnosis, one: Profiled) -> str:
     edges = np.append(one.low, one.high[-1])
     # Nothing is told, not even of noise, where there are too few windows.
     noise = 2.0 * np.where(np.isfinite(one.excess).all(axis=1), one.error, np.nan)
-    with mpl.rc_context(STYLE):
+    with styled():
         figure, axes = canvas(3, 4.6)
         for j, ax in enumerate(axes):
             ax.stairs(1.0 + noise, edges, baseline=1.0 / (1.0 + noise), fill=True, color=SHADE, linewidth=0)
@@ -307,7 +307,7 @@ def in_bands(diagnosis: Diagnosis) -> str:
     edges = np.array([bands[0].low_hz, *(band.high_hz for band in bands)])
     # A logarithmic axis has no place for zero.
     edges[0] = 0.5 * edges[1] if edges[0] == 0.0 else edges[0]
-    with mpl.rc_context(STYLE):
+    with styled():
         figure, axes = canvas(3, 4.6)
         for j, ax in enumerate(axes):
             power = {name: np.sqrt([getattr(band, name)[j] for band in bands]) for name in ("before", "after")}
@@ -323,6 +323,10 @@ def in_bands(diagnosis: Diagnosis) -> str:
 
 def _steps(ax: Axes, diagnosis: Diagnosis, edges: Floats, values: Mapping[str, Floats]) -> None:
     """Draw steps before and after on a logarithmic axis that may span less than a decade."""
+    from matplotlib.ticker import FuncFormatter, NullLocator
+
+    from ferryid.report.log_ticks import LogTicks
+
     for name, colour in (("before", BASE), ("after", NEW)):
         if name == "before" or diagnosis.findings:
             ax.stairs(values[name], edges, baseline=None, color=colour, linewidth=1.6, label=name)

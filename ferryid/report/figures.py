@@ -6,16 +6,12 @@ All are drawn 6 inches wide with 9-point text, so that they stay legible at the 
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from copy import copy
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.axis import Tick
-from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 from numpy.typing import NDArray
 
 from ferryid.identify import ComponentCurve, Excitation, LogFit
@@ -25,6 +21,11 @@ from ferryid.report.structure import autocorrelation, envelope, spectrum
 from ferryid.signals.track import segments
 from ferryid.types import AXES, Floats
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.axis import Tick
+    from matplotlib.figure import Figure
+
 WIDTH = 6.0
 MEASURED, BASE, NEW, SHADE = "#222222", "#d55e00", "#0072b2", "#e8eef4"
 ROLES = {MEASURED: "measured", BASE: "base", NEW: "new"}
@@ -32,8 +33,6 @@ ROLES = {MEASURED: "measured", BASE: "base", NEW: "new"}
 UNITS = ("N", "N", "N·m")
 REACH = 8.0
 """Where the axis of the coefficient figure ends; a coefficient this far from zero is beyond doubt anyway."""
-EDGE = 1e-6
-"""Share by which a tick may lie beyond the limits of a logarithmic axis: at them it is drawn."""
 SYMBOLS = ("X", "Y", "N")
 STYLE: dict[Any, Any] = {
     "font.size": 10,
@@ -53,10 +52,20 @@ STYLE: dict[Any, Any] = {
 }
 
 
+def styled(more: Mapping[Any, Any] | None = None) -> AbstractContextManager[None]:
+    """Return what draws in the style of all figures, and of `more`, while it lasts."""
+    # A fifth of a second to import: a process whose figures another one draws does without.
+    import matplotlib as mpl
+
+    return mpl.rc_context({**STYLE, **(more or {})})
+
+
 def margins(
     height: float, *, top: float = 0.15, left: float = 0.85, between: tuple[float, float] = (0.25, 0.15)
 ) -> Figure:
     """Return an empty figure with margins in inches; fixed ones, since measuring all text takes longer than drawing it."""
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(WIDTH, height))
     figure.subplots_adjust(
         left=left / WIDTH,
@@ -93,19 +102,12 @@ def legend_above(figure: Figure, ax: Axes, columns: int, title: str = "") -> Non
     )
 
 
-class LogTicks(LogLocator):
-    """Ticks of a logarithmic axis within its limits: one beyond them is not drawn, but takes as long to make."""
-
-    def tick_values(self, vmin: float, vmax: float) -> list[float]:
-        """Return the places of the ticks."""
-        values = np.asarray(super().tick_values(vmin, vmax), dtype=np.float64)
-        low, high = min(vmin, vmax), max(vmin, vmax)
-        inside: list[float] = values[(values >= low * (1.0 - EDGE)) & (values <= high * (1.0 + EDGE))].tolist()
-        return inside
-
-
 def plain_log(ax: Axes, *, x: bool, y: bool) -> None:
     """Label logarithmic axes as 1e-3, 1e0: typeset exponents take longer than all else on the page."""
+    from matplotlib.ticker import FuncFormatter, NullFormatter
+
+    from ferryid.report.log_ticks import LogTicks
+
     for wanted, axis in ((x, ax.xaxis), (y, ax.yaxis)):
         if wanted:
             axis.set_major_locator(LogTicks())
@@ -132,6 +134,8 @@ def _copy_ticks(ticks: list[Tick], count: int) -> None:
 
 def svg_text(figure: Figure) -> str:
     """Return the drawing of a figure, the same for the same figure."""
+    from matplotlib.ticker import NullLocator
+
     for ax in figure.axes:
         for axis in (ax.xaxis, ax.yaxis):
             _copy_ticks(axis.majorTicks, len(axis.get_majorticklocs()))
@@ -145,7 +149,7 @@ def svg_text(figure: Figure) -> str:
 
 def forces(log: LogFit, first_s: float | None = None, last_s: float | None = None) -> str:
     """Measured force against the estimates of both models over time; what validates and what is left out is shaded."""
-    with mpl.rc_context(STYLE):
+    with styled():
         figure, axes = canvas(3, 5.2)
         t = log.motion.t
         inside = np.ones(len(t), dtype=bool) if first_s is None else (t >= first_s) & (t <= (last_s or t[-1]))
@@ -187,7 +191,7 @@ def _limits(ax: Axes, log: LogFit, rows: NDArray[np.int64], j: int) -> None:
 
 def residual_spectrum(logs: Sequence[LogFit]) -> str:
     """Power spectral density of the force residual before and after, longest unbroken stretch of each log."""
-    with mpl.rc_context(STYLE):
+    with styled():
         figure, axes = canvas(3, 5.2)
         for j, ax in enumerate(axes):
             for name, colour, label in (("tau_base", BASE, "base model"), ("tau_model", NEW, "new model")):
@@ -206,7 +210,7 @@ def residual_spectrum(logs: Sequence[LogFit]) -> str:
 
 def residual_autocorrelation(logs: Sequence[LogFit]) -> str:
     """Autocorrelation of the residual that remains; white noise would stay inside the dashed band."""
-    with mpl.rc_context(STYLE):
+    with styled():
         figure, axes = canvas(3, 4.6)
         for j, ax in enumerate(axes):
             for name, colour, label in (("tau_base", BASE, "base model"), ("tau_model", NEW, "new model")):
@@ -227,7 +231,9 @@ def residual_autocorrelation(logs: Sequence[LogFit]) -> str:
 
 def components(curve: ComponentCurve) -> str:
     """Normalised MSE against the number of components, training and validation."""
-    with mpl.rc_context(STYLE):
+    from matplotlib.ticker import MaxNLocator
+
+    with styled():
         figure, (ax,) = canvas(1, 3.2, top=0.55)
         for j, (axis, colour) in enumerate(zip(AXES, ("#0072b2", "#009e73", "#cc79a7"), strict=True)):
             ax.plot(curve.components, curve.validation[:, j], color=colour, marker="o", markersize=3, label=axis)
@@ -248,7 +254,7 @@ def coefficient_intervals(
     terms: Sequence[str], theta: Floats, low: Floats, high: Floats, undetermined: frozenset[str] = frozenset()
 ) -> str:
     """Coefficients with 95 % intervals, each in units of its own interval's half width, so that all fit one axis."""
-    with mpl.rc_context(STYLE):
+    with styled():
         left = 0.4 + 0.085 * max(len(term) for term in terms)
         figure = margins(1.0 + 0.2 * len(terms), top=0.3, left=left, between=(0.08, 0.1))
         columns = figure.subplots(1, 3, sharey=True)
@@ -275,7 +281,7 @@ def coefficient_intervals(
 
 def excitation(result: Excitation, logs: Sequence[LogFit]) -> str:
     """Singular values of the standardised basis, and where the velocities were."""
-    with mpl.rc_context(STYLE):
+    with styled():
         figure = margins(5.6, between=(0.38, 0.3))
         grid = figure.subplots(2, 2)
         values = result.singular_values
@@ -299,7 +305,7 @@ def excitation(result: Excitation, logs: Sequence[LogFit]) -> str:
 
 def free_run_errors(base: FreeRun, new: FreeRun) -> str:
     """Free-run error against horizon, base and new model."""
-    with mpl.rc_context(STYLE):
+    with styled():
         figure = margins(4.6, between=(0.3, 0.15))
         grid = figure.subplots(2, 2, sharex=True)
         for ax, name, label, factor in (
@@ -320,7 +326,7 @@ def free_run_errors(base: FreeRun, new: FreeRun) -> str:
 
 def free_run_example(base: FreeRun, new: FreeRun) -> str:
     """One free run: measured velocities and those that the models predict from the first instant on."""
-    with mpl.rc_context(STYLE):
+    with styled():
         figure, axes = canvas(3, 4.8)
         factor = (1.0, 1.0, np.degrees(1.0))
         for j, (ax, label) in enumerate(zip(axes, ("u [m/s]", "v [m/s]", "r [deg/s]"), strict=True)):
@@ -343,7 +349,7 @@ def free_run_example(base: FreeRun, new: FreeRun) -> str:
 
 def track(logs: Sequence[LogFit]) -> str:
     """Where the vessel went, north up."""
-    with mpl.rc_context(STYLE):
+    with styled():
         figure, (ax,) = canvas(1, 4.0, top=0.15)
         for log in logs:
             eta = np.where(log.motion.valid[:, None], log.motion.eta, np.nan)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.axes import Axes
 
 from ferryid.counts import counted
 from ferryid.signals.track import Interval, LeftOut
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 LEFT_OUT = "#f7dcc8"
 """Colour of the shading, light orange beside the light blue of validation."""

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-import matplotlib as mpl
-
 from ferryid.counts import counted
 from ferryid.diagnose import Likeness, Pair, separation
 from ferryid.effects.wording import listed
 from ferryid.report.drawings import NONE, Drawings
-from ferryid.report.figures import MEASURED, STYLE, WIDTH, margins, svg_text
+from ferryid.report.figures import MEASURED, WIDTH, margins, styled, svg_text
 from ferryid.report.heat_map import HeatCell, HeatMap
 
 CELL, NAMES, BAR = 0.27, 2.9, 0.7
@@ -27,7 +25,7 @@ def heat_map(likeness: Likeness) -> str:
     side = min(CELL * n, WIDTH - NAMES - BAR - 0.1)
     bottom, top = 0.35, 0.1
     height = side + bottom + top
-    with mpl.rc_context({**STYLE, "axes.grid": False}):
+    with styled({"axes.grid": False}):
         figure = margins(height)
         ax = figure.add_axes((NAMES / WIDTH, bottom / height, side / WIDTH, side / height))
         mesh = ax.pcolormesh(likeness.matrix, cmap="Blues", vmin=0.0, vmax=1.0, edgecolors="white", linewidth=0.6)

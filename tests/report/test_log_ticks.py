@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.ticker import LogLocator
 
-from ferryid.report.figures import LogTicks
+from ferryid.report.log_ticks import LogTicks
 
 
 @pytest.mark.parametrize("limits", [(0.3, 4.0), (1e-3, 1e4), (2.0, 2e2), (4.0, 0.3)])

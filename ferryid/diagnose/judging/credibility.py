@@ -178,7 +178,7 @@ def interval_doubt(
         away = ndtri(0.975) * (np.array([one.value for one in told]) - neutral) / np.maximum(half, 1e-300)
         spread = np.sqrt(np.diag(covariance)[sized])
         alike = _given(covariance, sized, confined) / np.outer(spread, spread)
-        none = float(away @ np.linalg.solve(alike, away)) <= chdtri(len(sized), 0.05)
+        none = float(away @ np.linalg.solve(alike, away)) <= float(chdtri(len(sized), 0.05))
     return "its 95 % interval includes no effect at all" if none else ""
 
 
