@@ -14,6 +14,7 @@ from ferryid.identify import FitOutcome, LogFit
 from ferryid.models import RANGE_UNITS, ForceScores
 from ferryid.models.forces import effective_mass
 from ferryid.report import figures
+from ferryid.report.drawings import NONE, Drawings
 from ferryid.report.fit_timeline import fit_timeline
 from ferryid.report.folder import made
 from ferryid.report.headline import headline_of
@@ -33,7 +34,7 @@ Page = tuple[str, dict[str, str], dict[str, str]]
 """HTML, drawings (SVG) by name, and the data of the interactive figures by file name."""
 
 
-def page_of(result: FitOutcome, folder: Path, out: Path, command: Sequence[str]) -> Page:
+def page_of(result: FitOutcome, folder: Path, out: Path, command: Sequence[str], drawings: Drawings = NONE) -> Page:
     """Return the report of a fit.
 
     Parameters
@@ -44,11 +45,13 @@ def page_of(result: FitOutcome, folder: Path, out: Path, command: Sequence[str])
         Folder of the page, and the output folder that keeps the scripts of interactive figures; see `write_assets`.
     command
         The words that it was asked for with.
+    drawings
+        Those that exist already.
     """
     timelines = {k: fit_timeline(log) for k, log in enumerate(result.logs[:MAX_LOGS])}
     interactive = interactive_of(timelines, folder, out)
-    text, drawings = render(result, interactive, made(command))
-    return text, drawings, interactive.files()
+    text, every = render(result, interactive, made(command), drawings)
+    return text, every, interactive.files()
 
 
 def load_all() -> None:
@@ -62,13 +65,16 @@ def load_all() -> None:
 
 
 def render(
-    result: FitOutcome, interactive: Interactive = STATIC, origin: Mapping[str, str] | None = None
+    result: FitOutcome,
+    interactive: Interactive = STATIC,
+    origin: Mapping[str, str] | None = None,
+    drawings: Drawings = NONE,
 ) -> tuple[str, dict[str, str]]:
     """Return the report of a fit as HTML with the drawings inside, and the drawings (SVG) by name.
 
-    `origin` is what `ferryid.report.folder.made` returns.
+    `origin` is what `ferryid.report.folder.made` returns, and `drawings` are those that exist already.
     """
-    context = {**_context(result, interactive), "made": origin}
+    context = {**_context(result, interactive, drawings), "made": origin}
     return template("fit.html").render(context), dict(_drawings(context))
 
 
@@ -88,7 +94,7 @@ def _drawings(part: Any) -> Iterator[tuple[str, str]]:
 _HOLDS = {True: "yes", False: "no", None: "not known"}
 
 
-def _context(result: FitOutcome, interactive: Interactive) -> dict[str, Any]:
+def _context(result: FitOutcome, interactive: Interactive, drawings: Drawings) -> dict[str, Any]:
     model, verdict = result.model, result.acceptance
     drawn = result.logs[:MAX_LOGS]
     left = [log.motion.log for log in result.logs[MAX_LOGS:]]
@@ -124,7 +130,7 @@ def _context(result: FitOutcome, interactive: Interactive) -> dict[str, Any]:
         "refitted": "estimated_from" in result.model.settings,
         "split_notes": result.scores.split_notes,
         "logs": [
-            {"name": log.motion.log, "figures": _force_figures(log), "timeline": interactive.number(k)}
+            {"name": log.motion.log, "figures": _force_figures(log, drawings), "timeline": interactive.number(k)}
             for k, log in enumerate(drawn)
         ],
         "assets": interactive.assets,
@@ -134,21 +140,21 @@ def _context(result: FitOutcome, interactive: Interactive) -> dict[str, Any]:
             for who, run in (("Base model", result.free_run_base), ("New model", result.free_run_model))
             if run.note
         ],
-        "free_run_figures": _free_run_figures(result),
+        "free_run_figures": _free_run_figures(result, drawings),
         "residual_lines": [line for log in drawn for line in remainder(log)],
         "residual_figures": []
         if not drawn
         else [
             {
                 "file": "residual-spectrum",
-                "svg": figures.residual_spectrum(drawn),
+                "svg": drawings.of("residual-spectrum", figures.residual_spectrum, drawn),
                 "caption": "Power spectral density of measured minus estimated force. A peak at some tenths of a hertz "
                 "is mostly waves; what stays at the lowest frequencies is wind, current or a wrong model. The regular "
                 "notches are zeros of the smoothing window.",
             },
             {
                 "file": "residual-autocorrelation",
-                "svg": figures.residual_autocorrelation(drawn),
+                "svg": drawings.of("residual-autocorrelation", figures.residual_autocorrelation, drawn),
                 "caption": "Autocorrelation of the same residual. White noise would stay inside the dashed band; a slow "
                 "decay shows that something with a memory was left out, and that neighbouring samples are no independent "
                 "evidence.",
@@ -157,13 +163,15 @@ def _context(result: FitOutcome, interactive: Interactive) -> dict[str, Any]:
         "model_figures": [
             {
                 "file": "components",
-                "svg": figures.components(result.curve),
+                "svg": drawings.of("components", figures.components, result.curve),
                 "caption": "Force error over the base model's on the validation rows (orange line at 1) against the number of "
                 "SIMPLS components. Training rows, dotted, may hold more force, and so more error.",
             },
             {
                 "file": "coefficients",
-                "svg": figures.coefficient_intervals(
+                "svg": drawings.of(
+                    "coefficients",
+                    figures.coefficient_intervals,
                     (*model.terms, "1"),
                     np.vstack([model.theta, model.intercept]),
                     np.vstack([model.low, model.intercept_low]),
@@ -186,14 +194,14 @@ def _context(result: FitOutcome, interactive: Interactive) -> dict[str, Any]:
         else [
             {
                 "file": "excitation",
-                "svg": figures.excitation(result.excitation, drawn),
+                "svg": drawings.of("excitation", figures.excitation, result.excitation, drawn),
                 "caption": "Top left: singular values of the standardised basis; a value near zero is a combination of "
                 "terms that this trial does not identify. The rest: velocities in the training rows, each pair against "
                 "the other; a model is only as good as the cloud it saw.",
             },
             {
                 "file": "track",
-                "svg": figures.track(result.logs),
+                "svg": drawings.of("track", figures.track, result.logs),
                 "caption": "Where the vessel went. Gaps are stretches without data.",
             },
         ],
@@ -235,11 +243,11 @@ def _score_rows(scores: ForceScores) -> list[dict[str, Any]]:
     ]
 
 
-def _force_figures(log: LogFit) -> list[dict[str, Any]]:
+def _force_figures(log: LogFit, drawings: Drawings) -> list[dict[str, Any]]:
     shown: list[dict[str, Any]] = [
         {
             "file": f"forces-{log.motion.log}",
-            "svg": figures.forces(log),
+            "svg": drawings.of(f"forces-{log.motion.log}", figures.forces, log),
             "caption": "Applied force as measured at the actuators, and as each model estimates it from the motion. "
             "Shaded: validation, which the new model did not see, and what is left out.",
             "over_time": True,
@@ -251,7 +259,9 @@ def _force_figures(log: LogFit) -> list[dict[str, Any]]:
             shown.append(
                 {
                     "file": f"forces-{log.motion.log}-{word}-minute",
-                    "svg": figures.forces(log, start, start + 60.0),
+                    "svg": drawings.of(
+                        f"forces-{log.motion.log}-{word}-minute", figures.forces, log, start, start + 60.0
+                    ),
                     "caption": f"The {word} minute of the new model, from {start:.0f} s.",
                     "over_time": True,
                 }
@@ -259,14 +269,14 @@ def _force_figures(log: LogFit) -> list[dict[str, Any]]:
     return shown
 
 
-def _free_run_figures(result: FitOutcome) -> list[dict[str, str]]:
+def _free_run_figures(result: FitOutcome, drawings: Drawings) -> list[dict[str, str]]:
     base, new = result.free_run_base, result.free_run_model
     shown = []
     if base.starts or new.starts:
         shown.append(
             {
                 "file": "free-run-errors",
-                "svg": figures.free_run_errors(base, new),
+                "svg": drawings.of("free-run-errors", figures.free_run_errors, base, new),
                 "caption": f"Root-mean-square error of {counted(max(base.starts, new.starts), 'run')} on "
                 "validation rows: each takes "
                 "the measured state once and then only the measured actuator forces.",
@@ -276,7 +286,7 @@ def _free_run_figures(result: FitOutcome) -> list[dict[str, str]]:
         shown.append(
             {
                 "file": "free-run",
-                "svg": figures.free_run_example(base, new),
+                "svg": drawings.of("free-run", figures.free_run_example, base, new),
                 "caption": "One of these runs, over the longest stretch there is.",
             }
         )

@@ -168,10 +168,13 @@ def started(kind: type[Kind], wanted: bool = True) -> Iterator[Kind | None]:
 def serve_page() -> None:
     """Make the page that is asked for on standard input."""
     with _serving() as (request, answer):
+        from ferryid.report.drawn_by_two import drawn_by_two
         from ferryid.report.page import load_all, page_of
 
         load_all()
-        answer(page_of(*request()))
+        asked: tuple[FitOutcome, Path, Path, Sequence[str]] = request()
+        # Who asked waits meanwhile: its core is free for half of the drawings.
+        answer(drawn_by_two(lambda drawings: page_of(*asked, drawings)))
 
 
 def serve_drawings() -> None:
