@@ -69,3 +69,12 @@ def test_worst_and_best_minute_are_the_planted_ones() -> None:
 
 def test_a_log_too_short_for_minutes_has_none() -> None:
     assert worst_and_best_minute(log_with(np.ones((900, 3)))) is None
+
+
+@pytest.mark.parametrize("rows", [1021, 1024, 1100])
+def test_autocorrelation_is_that_of_the_sums_whatever_the_number_of_rows(rows: int) -> None:
+    residual = np.cumsum(np.random.default_rng(3).standard_normal((rows, 3)), axis=0)
+    lag, correlation, _ = autocorrelation(log_with(residual), "tau_model", 0)
+    centred = residual[:, 0] - residual[:, 0].mean()
+    sums = np.array([centred[: rows - k] @ centred[k:] for k in range(len(lag))])
+    np.testing.assert_allclose(correlation, sums / sums[0], atol=1e-12)
