@@ -23,11 +23,11 @@ def sign_changes(model: Model) -> tuple[str, ...]:
     for name, before, unit in zip(COEFFICIENTS, base.tolist(), UNITS, strict=True):
         value, low, high = found[name].tolist()
         if before * value < 0.0 and low * high > 0.0:
-            turned.append(f"{name} {value:.4g} {unit} ({low:.4g} to {high:.4g}), there {before:.4g}")
+            turned.append(f"{name} {value:.4g} {unit} ({low:.4g} to {high:.4g}; base model {before:.4g})")
     if not turned:
         return ()
     more = f" and {len(turned) - MOST_NAMED} more" if len(turned) > MOST_NAMED else ""
     return (
         f"Of another sign than in the base model, beyond the 95 % interval: {'; '.join(turned[:MOST_NAMED])}{more}. "
-        "Something else may be in it.",
+        "The base model may be wrong in them, or they stand for a force that has no term.",
     )

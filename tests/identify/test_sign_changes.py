@@ -31,8 +31,8 @@ def test_a_coefficient_that_turns_beyond_its_interval_is_told(spread: float, tol
     said = sign_changes(turned({("u_dot", 0): -3390.0}, spread))
     assert said == (
         (
-            "Of another sign than in the base model, beyond the 95 % interval: m11 -1000 kg (-1100 to -900.3), there 2390. "
-            "Something else may be in it.",
+            "Of another sign than in the base model, beyond the 95 % interval: m11 -1000 kg (-1100 to -900.3; base model "
+            "2390). The base model may be wrong in them, or they stand for a force that has no term.",
         )
         if told
         else ()
@@ -43,5 +43,5 @@ def test_those_beyond_the_fourth_are_counted() -> None:
     """Damping of a SNAME coefficient that is negative takes a positive force."""
     terms = {("u_dot", 0): -1e5, ("v_dot", 1): -1e5, ("r_dot", 2): -1e5, ("u", 0): -1e5, ("v", 1): -1e5, ("r", 2): -1e5}
     (said,) = sign_changes(turned(terms, 1.0))
-    assert said.count(" there ") == 4
-    assert said.endswith("and 2 more. Something else may be in it.")
+    assert said.count("; base model ") == 4
+    assert said.endswith("and 2 more. The base model may be wrong in them, or they stand for a force that has no term.")
