@@ -12,6 +12,7 @@ from ferryid.effects import effects
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.models import Conditions, Model, StoredEffect
 from ferryid.models.forces import UnmappedTerms, beside_the_hull, hull_coefficients, replace_hull_coefficients
+from ferryid.signals.recording import log_name
 from ferryid.simulate.check_scenario import vessel_of
 from ferryid.simulate.plant.beside import FACTORS
 from ferryid.simulate.scenario import Scenario, scenario_of
@@ -101,6 +102,8 @@ def sailed_by(scenario: Scenario, model: Model, conditions: str = "") -> Sailing
 
 def _conditions(model: Model, log: str) -> Conditions:
     known = {one.log: one for one in model.conditions}
+    # A model lists logs by name; a path stands for the log of its name.
+    log = log if log in known or log_name(log) not in known else log_name(log)
     if log not in known:
         found = f"those of {', '.join(known)}" if known else "none"
         raise FerryIdError(
