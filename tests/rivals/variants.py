@@ -16,7 +16,6 @@ from ferryid.identify.log_conditions import Conditions
 from ferryid.identify.weak_data import WeakData, weak_data
 from ferryid.identify.weak_rows import to_force
 from ferryid.identify.window_length import with_best_length
-from ferryid.signals.complementary_filter import complementary_filter
 from ferryid.types import Floats, no_progress
 from tests.rivals.task import Task, coefficients
 
@@ -28,18 +27,17 @@ def as_it_is(task: Task, draws: int) -> Coefficients:
 
 def measured_velocity(task: Task, draws: int) -> Coefficients:
     """Return what it finds with the velocities as measured in every product."""
-    return _estimate(_with_velocities(task, [m.nu for m in task.data.motions]), draws)
+    return _estimate(_with_velocities(task, steadied=False), draws)
 
 
 def steadied_velocity(task: Task, draws: int) -> Coefficients:
     """Return what it finds with velocities steadied by positions in every log."""
-    steadied = [complementary_filter(m.nu, m.nu, m.eta, m.rate_hz) for m in task.data.motions]
-    return _estimate(_with_velocities(task, steadied), draws)
+    return _estimate(_with_velocities(task, steadied=True), draws)
 
 
 def without_winds(task: Task, draws: int) -> Coefficients:
     """Return what it finds without winds of single logs: steady forces along the hull, north and east stay."""
-    data = with_best_length(weak_data(task.data))
+    data = _anew(task)
     data.__dict__["conditions"] = Conditions.none(data.windows.training, len(data.functions.terms))
     return _estimate(data, draws)
 
@@ -51,14 +49,19 @@ def noise_corrected(task: Task, draws: int) -> Coefficients:
     squares of either (the symmetrised instrument of repeated measurements; Fuller 1987, section 2.4).
     """
     data = with_best_length(weak_data(task.data))
-    first = _with_velocities(task, [m.nu for m in task.data.motions])
-    slow = [complementary_filter(m.nu, m.nu, m.eta, m.rate_hz) for m in task.data.motions]
-    return _instrumented(data, *(_regressors(one) for one in (first, _with_velocities(task, slow))))
+    return _instrumented(data, *(_regressors(_with_velocities(task, steadied=one)) for one in (False, True)))
 
 
-def _with_velocities(task: Task, velocities: list[Floats]) -> WeakData:
-    data = with_best_length(weak_data(replace(task.data)))
-    data.windows.__dict__["velocities"] = tuple(velocities)
+def _anew(task: Task) -> WeakData:
+    """Return the data with the windows' length chosen and nothing estimated: what is set takes part in all that follows."""
+    return replace(with_best_length(weak_data(task.data)))
+
+
+def _with_velocities(task: Task, *, steadied: bool) -> WeakData:
+    data = _anew(task)
+    windows = data.windows
+    rows = windows._averaged(windows.split.training, windows.training_length_s, steadied=steadied)
+    windows.__dict__["_chosen"] = steadied, rows
     return data
 
 
