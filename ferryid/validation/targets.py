@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from math import log
 
 from ferryid.json_record import Record
-from ferryid.validation.name_scores import Share
-from ferryid.validation.scores import CLEAN, Scores
+from ferryid.validation.case_sampling import LEVELS
+from ferryid.validation.estimate_errors import EstimateErrors
+from ferryid.validation.name_scores import Cell, Share
+from ferryid.validation.plant.effects import plant_effects
+from ferryid.validation.scores import CLEAN, Detection, Scores
 from ferryid.validation.sea_scores import SeaScores
 
 MOST_RATIO = 1.5
@@ -17,6 +22,12 @@ FALSE = 0.01
 """Share of logs that may have a wrong name."""
 AT_SEA = 0.95
 """Share of the effects that change a campaign at sea twice as much as an oracle just sees, or more, which is to be named."""
+MIDDLE = 0.95
+"""Share of the effects of a middle size that is to be named."""
+PAIRS = 0.85
+"""Share of the logs with two effects of which both are to be named."""
+MEDIAN_ERROR = 0.03
+"""Median relative error of parameters that is allowed."""
 IN_TIME = 0.9
 """Share of onsets and offsets that is to be within 5 s."""
 
@@ -64,6 +75,14 @@ def targets(scores: Scores) -> list[Target]:
     sizes = f"sizes named 19 times in 20 at most {MOST_RATIO} times the oracle's"
     return [
         share_target(
+            f"effects of the middle of five sizes named: at least {100.0 * MIDDLE:.0f} %",
+            middle_sizes(scores.detections),
+            at_least=MIDDLE,
+        ),
+        share_target(
+            f"pairs of effects, both named: at least {100.0 * PAIRS:.0f} %", both_of_pairs(scores.cells), at_least=PAIRS
+        ),
+        share_target(
             "clean logs with a wrong name: at most 1 %", scores.false_names.get(CLEAN, Share(0, 0)), at_most=FALSE
         ),
         share_target("all logs with a wrong name: at most 1 %", scores.false_names["all"], at_most=FALSE),
@@ -71,6 +90,7 @@ def targets(scores: Scores) -> list[Target]:
             "95 % intervals that hold the truth: 93 to 97 %", every.covered, at_least=COVERED[0], at_most=COVERED[1]
         ),
         share_target("onsets and offsets within 5 s: at least 90 %", every.in_time, at_least=IN_TIME),
+        _median_error("", every),
         Target(f"{sizes}: {len(near)} of {tested} effects", len(near) == tested, True)
         if tested
         else Target(sizes, None, False, tested=False),
@@ -79,9 +99,11 @@ def targets(scores: Scores) -> list[Target]:
 
 
 def _at_sea(sea: SeaScores | None) -> list[Target]:
-    named, false, covered = (Share(0, 0),) * 3
-    if sea is not None:
-        named, false, covered = sea.named_from_twice, sea.false, sea.recoveries[0].covered
+    if sea is None:
+        named, false, every = Share(0, 0), Share(0, 0), None
+    else:
+        named, false, every = sea.named_from_twice, sea.false, sea.recoveries[0]
+    covered = Share(0, 0) if every is None else every.covered
     return [
         share_target(
             f"at sea, effects named from twice what the oracle sees on: at least {100.0 * AT_SEA:.0f} %",
@@ -92,7 +114,32 @@ def _at_sea(sea: SeaScores | None) -> list[Target]:
         share_target(
             "at sea, 95 % intervals that hold the truth: 93 to 97 %", covered, at_least=COVERED[0], at_most=COVERED[1]
         ),
+        _median_error("at sea, ", every),
     ]
+
+
+def _median_error(where: str, found: EstimateErrors | None) -> Target:
+    what = f"{where}median relative error of parameters: at most {100.0 * MEDIAN_ERROR:.0f} %"
+    if found is None or not found.errors:
+        return Target(what, None, False, tested=False)
+    return Target(f"{what}; {100.0 * found.median_error:.1f} %", found.median_error <= MEDIAN_ERROR, True)
+
+
+def middle_sizes(detections: Iterable[Detection]) -> Share:
+    """Return how many effects of the middle of five sizes were named, each size being a fifth of the range by the logarithm."""
+    named: list[bool] = []
+    for one in detections:
+        least, most = plant_effects()[one.effect].sizes
+        for size, found in zip(one.sizes, one.blind_named, strict=True):
+            if int(LEVELS * log(size / least) / log(most / least)) == LEVELS // 2:
+                named.append(found)
+    return Share(sum(named), len(named))
+
+
+def both_of_pairs(cells: Iterable[Cell]) -> Share:
+    """Return in how many logs with two effects both were named."""
+    pairs = [one.every for one in cells if one.kind == "pair"]
+    return Share(sum(one.count for one in pairs), sum(one.of for one in pairs))
 
 
 def share_target(what: str, share: Share, *, at_least: float = 0.0, at_most: float = 1.0) -> Target:

@@ -9,10 +9,11 @@ import pytest
 
 from ferryid.validation.name_scores import Share
 from ferryid.validation.page import figures, page
+from ferryid.validation.plant.effects import plant_effects
 from ferryid.validation.records import TransferResult, TransferScore
 from ferryid.validation.run import render_summary
 from ferryid.validation.scores import score
-from ferryid.validation.targets import share_target, targets
+from ferryid.validation.targets import both_of_pairs, middle_sizes, share_target, targets
 from tests.validation.test_scores import WIND, curve_results, finding, result
 
 pytestmark = pytest.mark.draws
@@ -64,17 +65,34 @@ def test_the_page_has_commitment_sizes_and_what_was_missed() -> None:
     assert not any(line.startswith(("{%", "{{")) for line in text.splitlines())
 
 
+def test_middle_sizes_and_pairs_are_counted_among_the_targets() -> None:
+    least, most = plant_effects()["wind"].sizes
+    inside, outside = least * (most / least) ** 0.45, least * (most / least) ** 0.65
+    results = [
+        result([WIND], [finding("wind")], level=2, size=inside),
+        result([WIND], [finding("current")], level=2, size=inside),
+        result([WIND], [finding("wind")], level=3, size=outside),
+        result([WIND], [finding("wind")], "pair", "pair"),
+    ]
+    found = score(results)
+    assert middle_sizes(found.detections) == Share(1, 2)
+    assert both_of_pairs(found.cells) == Share(1, 1)
+    (middle, pairs, *_) = targets(found)
+    assert middle.what.startswith("effects of the middle of five sizes named: at least 95 %; 50.0 % (1/2)")
+    assert pairs.what.startswith("pairs of effects, both named: at least 85 %; 100.0 % (1/1)")
+
+
 def test_a_target_without_data_is_not_tested() -> None:
     clean = score([result([], [], "clean", "clean")])
     every = targets(clean)
-    assert [one.tested for one in every] == [True, True, False, False, False, False, False, False]
+    assert [one.tested for one in every] == [False, False, True, True, *[False] * 8]
     assert {one.reached for one in every if not one.tested} == {None}
     text = page(RESULT, clean)
     for what in ("95 % intervals that hold the truth", "onsets and offsets within 5 s", "sizes named 19 times in 20"):
         (row,) = (line for line in text.splitlines() if line.startswith(f"| {what}"))
         assert row.endswith("| not tested |")
     summary = render_summary({**RESULT, "targets": [one.to_json() for one in every]})
-    assert summary.count("not tested") == 6
+    assert summary.count("not tested") == 10
     # Nor are figures linked that there are not.
     assert "detection.svg" not in text
     assert "errors.svg" not in text
