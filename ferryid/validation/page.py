@@ -6,15 +6,18 @@ from collections.abc import Mapping, Sequence
 from math import isfinite, isinf
 from typing import Any
 
+import numpy as np
+
 from ferryid.counts import counted
 from ferryid.report.validation_figures import Detected, confusion_matrix, detection_curves
 from ferryid.types import AXES
 from ferryid.validation.case_sampling import KINDS, SEA_LOGS, cells
+from ferryid.validation.estimate_errors import EstimateErrors
 from ferryid.validation.page_parts import BEYOND, answers, error_figure, error_row, few, percent, render
 from ferryid.validation.plant.effects import plant_effects
 from ferryid.validation.plant.vessels import VESSELS
 from ferryid.validation.scores import CLEAN, Detection, Scores
-from ferryid.validation.sea_scores import SeaScores
+from ferryid.validation.sea_scores import WIND, SeaScores
 from ferryid.validation.targets import MOST_RATIO, targets
 from ferryid.validation.transfer_scores import Claim, Method
 
@@ -134,8 +137,19 @@ def _sea(scores: SeaScores) -> dict[str, Any]:
         "logs": SEA_LOGS,
         "every": first,
         "median_error": percent(first.median_error),
+        "apart": _winds_apart(others),
         "errors": [error_row(one) for one in others],
     }
+
+
+def _winds_apart(found: Sequence[EstimateErrors]) -> str:
+    """Return the median error of the winds of the day and that of all else, as a phrase; winds are most of what is named."""
+    winds, rest = (
+        [error for one in found if (one.effect == WIND) is wind for error in one.errors] for wind in (True, False)
+    )
+    if not winds or not rest:
+        return ""
+    return f"{percent(float(np.median(winds)))} of {len(winds)} winds, {percent(float(np.median(rest)))} of {len(rest)} others"
 
 
 def _claim(one: Claim) -> tuple[Any, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 from xml.etree import ElementTree
 
@@ -139,6 +140,11 @@ def test_campaigns_at_sea_have_a_section_of_their_own() -> None:
     (row,) = (line for line in text.splitlines() if line.startswith("| current | 0.1 m/s |"))
     assert row.endswith("| yes | 0.0 | no |  |")
     assert "| at sea, campaigns with a wrong name: at most 1 %; 0.0 % (0/2)" in text
+    # Winds of the day are most of what is named: half as strong as it was is an error of a half.
+    half = found("wind", 3, north=1.0, east=2.0)
+    named = replace(every[0].diagnosis, findings=(*every[0].diagnosis.findings, half))
+    errors = page(RESULT, score([replace(every[0], diagnosis=named)]))
+    assert "(50.0 % of 1 winds, 0.0 % of 1 others)" in " ".join(errors.split())
     # Nothing is said of single logs where there are none.
     assert "| clean logs with a wrong name" not in text
     assert "Allowed is `hull_parameters`" not in text
