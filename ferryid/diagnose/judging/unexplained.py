@@ -31,7 +31,7 @@ from ferryid.diagnose.judging.sparse_regression import Law, select_law
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.force_model import ForceModel, Measurements
 from ferryid.side_by_side import over
-from ferryid.types import AXES, Floats
+from ferryid.types import AXES, Flags, Floats
 
 SPANS = 5
 """Intervals that are told."""
@@ -317,10 +317,26 @@ def _unsteady(problem: EstimationProblem, left: Location) -> Finding:
         onset_s=left.onset_s,
         offset_s=left.offset_s,
         regime=left.regime,
-        says=f"An unsteady disturbance acts, most in {axis}{fast}{when}{where}; no law of the vessel's motion explains it.",
+        says=f"An unsteady disturbance acts, most in {axis} ({left_over_size(left)}){fast}{when}{where}; no law of the "
+        "vessel's motion explains it.",
         band_hz=band,
         **figure_columns(problem, left, None, alone=True),
     )
+
+
+def left_over_size(left: Location) -> str:
+    """Return the size of what is left over while an unsteady disturbance acts, and at other times, on its strongest axis."""
+    axis = int(np.argmax(left.shares))
+    inside = np.zeros(len(left.middle_s), dtype=np.bool_)
+    for first, last in left.intervals:
+        inside |= (left.middle_s >= first) & (left.middle_s <= last)
+
+    def size(rows: Flags) -> str:
+        return f"{np.sqrt(np.mean(left.before[rows, axis] ** 2)):.2g} {FORCE[axis]}"
+
+    if inside.any() and not inside.all():
+        return f"{size(inside)} RMS left over then, {size(~inside)} at other times"
+    return f"{size(np.ones_like(inside))} RMS left over"
 
 
 def _band(bands: Sequence[Band], shares: Floats, detection_powers: Sequence[Floats]) -> tuple[float, float] | None:
