@@ -202,13 +202,13 @@ def smooth_measured(measured: Measured, window_s: float, smoother: str = "square
 
 
 def _with_heading_or_none(measured: Measured) -> Measured:
-    """Return a log without what needs a heading where few of its rows have one: their rows are too many to leave out."""
+    """Return a log without what needs a heading where few of its rows have one; one without any is refused where it needs one."""
     known = np.isfinite(measured.eta[:, 2])
     share = float(np.mean(known[measured.usable])) if measured.usable.any() else 0.0
     if share >= SIGNALS.heading_share:
         return measured
     flows = [what for what in ("wind", "current") if getattr(measured, what) is not None]
-    if not known.any() and not flows:
+    if not known.any():
         return measured
     told = f"The heading was measured on {100 * share:.0f} {ON_FEW_ROWS}"
     told += f", and {' and '.join(flows)} with it." if flows else "."
