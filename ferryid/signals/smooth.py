@@ -202,7 +202,7 @@ def smooth_measured(measured: Measured, window_s: float, smoother: str = "square
 
 
 def _with_heading_or_none(measured: Measured) -> Measured:
-    """Return a log without what needs a heading where few of its rows have one; one without any is refused where it needs one."""
+    """Return a log without what needs a heading where few rows have one; without any it is refused where it needs one."""
     known = np.isfinite(measured.eta[:, 2])
     share = float(np.mean(known[measured.usable])) if measured.usable.any() else 0.0
     if share >= SIGNALS.heading_share:
