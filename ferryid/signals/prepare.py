@@ -17,7 +17,7 @@ from ferryid.signals.faults import Faults
 from ferryid.signals.quality import POSE
 from ferryid.signals.recording import Recording, data_quality, record
 from ferryid.signals.sampling import check_grid, check_sampling
-from ferryid.signals.smooth import Measured, measure, smooth_measured
+from ferryid.signals.smooth import ON_FEW_ROWS, Measured, measure, smooth_measured
 from ferryid.signals.thresholds import SIGNALS
 from ferryid.signals.track import Motion, Track
 from ferryid.types import TimeRanges
@@ -170,4 +170,5 @@ def prepare(
 def smoothed(opened: Opened, window_s: float, smoother: str = "square", *, keep_track: bool = False) -> Prepared:
     """Smooth an opened log; arguments and errors are those of `prepare`."""
     motion = smooth_measured(opened.measured, window_s, smoother)
-    return Prepared(opened.recording, motion, opened.doubts, opened.track if keep_track else None)
+    unused = [said for said in motion.repairs if ON_FEW_ROWS in said]
+    return Prepared(opened.recording, motion, (*opened.doubts, *unused), opened.track if keep_track else None)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,6 +19,8 @@ from ferryid.vessel.profile import Profile
 
 SMOOTHERS = ("square", "savgol", "kalman")
 _POLYNOMIAL = 3
+ON_FEW_ROWS = "% of the rows only and is left out"
+"""What is told of a signal that is not used at all, as most of its rows lack it."""
 
 
 @dataclass(frozen=True)
@@ -141,6 +143,7 @@ def smooth_measured(measured: Measured, window_s: float, smoother: str = "square
             f'settings: there is no smoother called "{smoother}".{did_you_mean(smoother, SMOOTHERS)} '
             f"Fix: choose one of {', '.join(SMOOTHERS)}"
         )
+    measured = _with_heading_or_none(measured)
     rate = measured.rate_hz
     rows = odd_rows(window_s, rate)
     # Refused before any work, and again below where a smoother needs more than was asked for.
@@ -196,6 +199,21 @@ def smooth_measured(measured: Measured, window_s: float, smoother: str = "square
         sway_measured=measured.sway_measured,
         tau_steadied=done.get("tau_steadied"),
     )
+
+
+def _with_heading_or_none(measured: Measured) -> Measured:
+    """Return a log without what needs a heading where few rows have one; without any it is refused where it needs one."""
+    known = np.isfinite(measured.eta[:, 2])
+    share = float(np.mean(known[measured.usable])) if measured.usable.any() else 0.0
+    if share >= SIGNALS.heading_share:
+        return measured
+    flows = [what for what in ("wind", "current") if getattr(measured, what) is not None]
+    if not known.any():
+        return measured
+    told = f"The heading was measured on {100 * share:.0f} {ON_FEW_ROWS}"
+    told += f", and {' and '.join(flows)} with it." if flows else "."
+    eta = np.column_stack([measured.eta[:, :2], np.full(len(measured.eta), np.nan)])
+    return replace(measured, eta=eta, wind=None, current=None, repairs=(*measured.repairs, told))
 
 
 def odd_rows(window_s: float, rate_hz: float) -> int:
@@ -400,7 +418,7 @@ def _known(
     known: Flags = np.all(np.isfinite(pair), axis=1)
     share = float(np.mean(known[track.valid])) if track.valid.any() else 0.0
     if share < SIGNALS.weather_share:
-        repairs.append(f"The {what} was measured on {100 * share:.0f} % of the rows only and is left out.")
+        repairs.append(f"The {what} was measured on {100 * share:.0f} {ON_FEW_ROWS}.")
         return None
     lost = int(np.count_nonzero(usable & ~known))
     if lost:

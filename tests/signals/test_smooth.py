@@ -339,6 +339,23 @@ def test_wind_that_is_mostly_missing_is_left_out_and_short_losses_cost_their_row
     assert any("The wind was measured on 17 % of the rows only and is left out." in said for said in motion.repairs)
 
 
+def test_a_heading_that_few_rows_have_is_left_out_and_the_wind_with_it() -> None:
+    psi = np.zeros(2400)
+    flows = {"wind_N": np.full(2400, 3.0), "wind_E": np.ones(2400)}
+    psi[:1200] = np.nan
+    motion = smoothed(trial(psi=psi, **flows), 1.0)
+    assert np.isnan(motion.eta[:, 2]).all()
+    assert motion.wind is None
+    told = "The heading was measured on 50 % of the rows only and is left out, and wind with it."
+    assert told in motion.repairs
+    # The rows keep their velocities and forces.
+    assert motion.valid.mean() > 0.9
+    psi[100:] = 0.0
+    motion = smoothed(trial(psi=psi, **flows), 1.0)
+    assert motion.wind is not None
+    assert not any("heading was measured" in said for said in motion.repairs)
+
+
 def test_the_central_difference_is_exact_on_parabolas() -> None:
     t = np.arange(50) / RATE
     slope = central_difference((3.0 + 2.0 * t - 4.0 * t**2)[:, None], RATE)[:, 0]
