@@ -12,10 +12,10 @@ import numpy as np
 from ferryid.compare.thresholds import COMPARE
 from ferryid.identify import check_window
 from ferryid.models import RANGE_UNITS, ForceScores, Model, StoredEffect, force_scores, outside_ranges, usable_rows
-from ferryid.models.forces import effective_mass, without_inputs
+from ferryid.models.forces import Estimator, effective_mass, without_inputs
 from ferryid.models.prediction import Prediction, predict, predict_base, signal_map, window_errors, window_scores
 from ferryid.signals.copies import GivenLogs
-from ferryid.signals.prepare import prepare
+from ferryid.signals.prepare import Prepared, prepare
 from ferryid.signals.time_ranges import shares_data
 from ferryid.signals.track import Motion
 from ferryid.types import Flags, Floats, RunContext
@@ -59,7 +59,7 @@ def evaluate(
     check_window(window_s)
     window = float(model.settings["window_s"]) if window_s is None else window_s
     smoother = str(model.settings.get("smoother", "square"))
-    entries, parts, windows = [], [], []
+    entries, parts, windows, beside_hull = [], [], [], []
     given = GivenLogs()
     for path in logs:
         run.progress(f"evaluating on {Path(path).name}")
@@ -84,6 +84,9 @@ def evaluate(
         new_run = old_run if new is old else new.free_run(rows)
         parts.append((motion.tau[rows], tau_base[rows], tau_model[rows]))
         windows.append(_in_windows(model, old, new, motion, rows, profile))
+        unscaled = _beside_unscaled(model, prepared, new, rows, profile)
+        if unscaled is not None:
+            beside_hull.append(unscaled)
         entries.append(
             {
                 "name": motion.log,
@@ -92,6 +95,7 @@ def evaluate(
                 "seconds": float(rows.sum() / motion.rate_hz),
                 **_scores(force_scores(motion.tau, tau_base, tau_model, rows), profile).to_json(),
                 "prediction": _prediction_json(windows[-1:], model, profile),
+                **_beside_hull_json(beside_hull[-1:], model, profile),
                 "free_run": {
                     "base": old_run.to_json(),
                     "model": new_run.to_json(),
@@ -114,6 +118,7 @@ def evaluate(
             "name": model.name,
             "version": model.version,
             "accepted": model.accepted,
+            "scale": model.changed_scale,
             **({"base": _base_of(model)} if model.diagnosed else {}),
         },
         "window_s": window,
@@ -121,6 +126,7 @@ def evaluate(
         "pooled": {
             **_scores(force_scores(tau, base_all, model_all, np.ones(len(tau), dtype=bool)), profile).to_json(),
             "prediction": _prediction_json(windows, model, profile),
+            **_beside_hull_json(beside_hull, model, profile),
         },
     }
 
@@ -139,6 +145,24 @@ def _in_windows(
     found = window_errors((base, new), motion, rows, mass, length_s, reduced=reduced)
     base_error, error = found.errors
     return found.force, base_error, error
+
+
+def _beside_unscaled(
+    model: Model, prepared: Prepared, new: Prediction, rows: Flags, profile: Profile
+) -> tuple[Floats, Floats, Floats] | None:
+    """Return what `_in_windows` does with the hull of the profile as it is for a base; None where the base is that hull."""
+    if model.diagnosed or not model.changed_scale:
+        return None
+    own = parse_profile(model.profile_text, model.name)
+    hull = Estimator(own, {})
+    old = Prediction(hull.of(prepared.motion), prepared.motion, hull)
+    return _in_windows(model, old, new, prepared.motion, rows, profile)
+
+
+def _beside_hull_json(
+    windows: Sequence[tuple[Floats, Floats, Floats]], model: Model, profile: Profile
+) -> dict[str, Any]:
+    return {"prediction_beside_hull": _prediction_json(windows, model, profile)} if windows else {}
 
 
 def _prediction_json(

@@ -14,6 +14,7 @@ import numpy as np
 
 from ferryid import __version__
 from ferryid.identify.acceptance import NOT_JUDGED, Acceptance, accept
+from ferryid.identify.beside_profile import beside_profile
 from ferryid.identify.estimation import estimate_correction
 from ferryid.identify.estimators import choose_estimator
 from ferryid.identify.excitation import still_axes
@@ -226,6 +227,8 @@ def accept_estimate(
             )
         )
     judged = _model(data, estimate, found, name, scores, acceptance, excitation)
+    if data.held_out:
+        acceptance = replace(acceptance, reasons=(*acceptance.reasons, *beside_profile(judged, data.profile, logs)))
     model = judged
     if whole is not None:
         model = _model(told, final, stored, name, scores, acceptance, told.excitation(final))

@@ -121,6 +121,11 @@ class Model:
         return not (self.diagnosed or self.terms) and self.settings["basis"] == NO_BASIS
 
     @property
+    def changed_scale(self) -> dict[str, float]:
+        """The factors on the base model that are not one."""
+        return {name: float(value) for name, value in self.scale.items() if value != 1.0}
+
+    @property
     def learned(self) -> bool:
         """True where terms were learned beside a diagnosis."""
         return self.diagnosed and bool(self.settings.get("learned", False))

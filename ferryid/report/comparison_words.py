@@ -19,6 +19,7 @@ from ferryid.compare import (
 from ferryid.counts import counted
 from ferryid.effects import effects
 from ferryid.effects.wording import listed, titled
+from ferryid.report.scale import scale_words
 from ferryid.types import AXES
 
 MANY = 4
@@ -255,9 +256,9 @@ def model_line(model: ComparedModel) -> str:
     if model.is_base:
         return "the hull in the profile alone"
     parts = ["a refitted hull" if model.basis == "none" else f"basis {model.basis}"]
-    changed = [f"{name} {value:g}" for name, value in model.scale.items() if value != 1.0]
+    changed = scale_words(model.scale)
     if changed:
-        parts.append(f"on a base model with {', '.join(changed)}")
+        parts.append(f"on a base model with {changed}")
     if model.diagnosed:
         parts.append("with what a diagnosis found")
     if model.training:

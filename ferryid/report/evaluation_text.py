@@ -6,17 +6,26 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.report.scale import scale_words
 from ferryid.types import AXES
 
 _ROWS = ("MSE over the base model's", "rms error, {} [N, N, N·m]", "R², model")
 _WINDOWS = ("squared prediction error / base", "  rms, {} [N, N, N·m]", "  R², model")
+HULL = "the profile's hull"
+_BESIDE_HULL = "  squared error / profile's hull"
 
 
 def render_evaluation(result: dict[str, Any]) -> str:
     """Return an evaluation as text."""
     head = result["model"]
     lines = [f"{head['name']}@{head['version']}, test data smoothed with {result['window_s']:g} s"]
+    lines += (
+        [] if head.get("accepted", True) else ["warning: this model is marked as rejected, as its fit was not accepted"]
+    )
     lines += [f"base: {head['base']}"] if "base" in head else []
+    scale = scale_words(head.get("scale", {}))
+    if scale and "base" not in head:
+        lines.append(f"base: the base model as fitted ({scale}), not the profile's hull")
     lines.append("")
     lines.append(f"{'':<34}" + "".join(f"{axis:>11}" for axis in AXES) + f"{'mean':>9}")
     entries = [*result["logs"], {"name": "all logs", **result["pooled"]}] if len(result["logs"]) > 1 else result["logs"]
@@ -25,11 +34,16 @@ def render_evaluation(result: dict[str, Any]) -> str:
         lines.extend(_score_lines(entry, _ROWS))
         if "prediction" in entry:
             lines.extend(_prediction_lines(entry["prediction"]))
+        beside_hull = entry.get("prediction_beside_hull", {"windows": 0})
+        if beside_hull["windows"]:
+            lines.extend(_beside_hull_lines(beside_hull))
         if "free_run" in entry:
             lines.extend(_free_run_lines(entry["free_run"]))
         lines.append(f"  {_verdict(entry, 'mean square force error')}")
         if entry.get("prediction", {}).get("windows"):
             lines.append(f"  {_verdict(entry['prediction'], 'squared prediction error in windows')}")
+        if beside_hull["windows"]:
+            lines.append(f"  {_verdict(beside_hull, 'squared prediction error in windows', HULL)}")
         applied = entry.get("effects", {"vessel": (), "conditions": (), "left_out": ()})
         lines.extend(f"  acts, as in every log: {one['says']}" for one in applied["vessel"])
         lines.extend(f"  acts, as in this log: {one['says']}" for one in applied["conditions"])
@@ -59,6 +73,16 @@ def _prediction_lines(scores: dict[str, Any]) -> list[str]:
     return _score_lines(scores, _WINDOWS)
 
 
+def _beside_hull_lines(scores: dict[str, Any]) -> list[str]:
+    """Return the ratio over the profile's hull, and what that errs; the model's own errors stand above."""
+    ratio = "".join(f"{_number(scores['per_axis'][axis]):>11}" for axis in AXES)
+    root = "".join(f"{_root(scores['mse']['base'][axis]):>11}" for axis in AXES)
+    return [
+        f"{_BESIDE_HULL:<34}{ratio}{_number(scores['normalised_mse']):>9}",
+        f"{'    rms, hull [N, N, N·m]':<34}{root}",
+    ]
+
+
 def _explained(window_s: float, diagnosed: bool) -> list[str]:
     """Return what the two kinds of errors are, as lines; the base of a diagnosed model sees all that was measured."""
     lines = [
@@ -71,17 +95,17 @@ def _explained(window_s: float, diagnosed: bool) -> list[str]:
     return lines if diagnosed else [*lines, "  The base model is without measured wind, current and payload there."]
 
 
-def _verdict(entry: dict[str, Any], error: str) -> str:
+def _verdict(entry: dict[str, Any], error: str, base: str = "its base model") -> str:
     mean = entry["normalised_mse"]
     worse = [axis for axis in AXES if np.isfinite(entry["per_axis"][axis]) and entry["per_axis"][axis] > 1.05]
     if np.isinf(mean):
         return f"cannot be judged: the model has no mass matrix that can be inverted ({error})"
     if not np.isfinite(mean):
-        return "cannot be judged: the base model makes no error here"
+        return f"cannot be judged: {base.replace('its', 'the')} makes no error here"
     better = mean < 1.0
     # Hardly any error is left, but some.
     digits = 1 if 0.0 < mean < 0.005 else 0
-    told = f"{abs(mean - 1.0):.{digits}%} {'better' if better else 'worse'} than its base model here ({error})"
+    told = f"{abs(mean - 1.0):.{digits}%} {'better' if better else 'worse'} than {base} here ({error})"
     if not worse:
         return told
     if len(worse) == len(AXES):

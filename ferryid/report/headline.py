@@ -6,6 +6,7 @@ import numpy as np
 
 from ferryid.counts import counted, verb
 from ferryid.identify import FitOutcome
+from ferryid.report.scale import scale_words
 from ferryid.vessel import parse_profile
 
 
@@ -14,6 +15,9 @@ def headline_of(result: FitOutcome) -> str:
     change = result.acceptance.normalised_mse - 1.0
     hull = parse_profile(result.model.profile_text, result.model.name).hull
     base = "the base model's" if hull.has_model else "that of the base model, which is rigid-body mass alone,"
+    scaled = scale_words(result.model.scale)
+    if scaled and hull.has_model:
+        base = f"that of the base model as fitted ({scaled})"
     if not np.isfinite(change):
         told = f"its {result.scores.measure} error could not be compared with the base model's"
     else:

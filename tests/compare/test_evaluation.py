@@ -21,6 +21,7 @@ from ferryid.models.prediction import Prediction, window_errors
 from ferryid.models.scores import force_scores
 from ferryid.regression.bases import make_basis
 from ferryid.report.evaluation_text import render_evaluation
+from ferryid.report.headline import headline_of
 from ferryid.signals.prepare import prepare
 from ferryid.types import AXES, RunContext
 from ferryid.vessel import load_profile
@@ -162,3 +163,44 @@ def test_a_copy_in_another_format_is_no_second_log(tmp_path: Path) -> None:
         FerryIdError, match=r"short\.bag: holds the recording of .*short\.mcap, or a piece of it.*Fix: "
     ):
         evaluate(model, [str(LOG), str(LOG.with_suffix(".bag"))], RunContext(tmp_path))
+
+
+@pytest.mark.slow
+def test_a_scaled_base_is_named_and_the_hull_of_the_profile_judged_beside(fitted: FitOutcome, tmp_path: Path) -> None:
+    told = evaluate(fitted.model, [str(LOG), str(LOG.with_name("second.bag"))], RunContext(tmp_path))
+    assert told["model"]["scale"] == {"delta": 0.4, "sigma": 0.4}
+    unscaled = replace(fitted.model, scale={"delta": 1.0, "sigma": 1.0, "zeta": 1.0})
+    own = evaluate(unscaled, [str(LOG), str(LOG.with_name("second.bag"))], RunContext(tmp_path))
+    assert own["model"]["scale"] == {}
+    for entry, other in zip((*told["logs"], told["pooled"]), (*own["logs"], own["pooled"]), strict=True):
+        beside, hull = entry["prediction_beside_hull"], other["prediction"]
+        assert "prediction_beside_hull" not in other
+        assert beside["windows"] == entry["prediction"]["windows"]
+        assert beside["mse"]["model"] == pytest.approx(entry["prediction"]["mse"]["model"])
+        # The same errors of the acceleration as those of a base that was never scaled, on another mass.
+        assert beside["mse"]["base"]["surge"] == pytest.approx(0.4**2 * hull["mse"]["base"]["surge"], rel=1e-6)
+    lines = render_evaluation(told).splitlines()
+    assert "base: the base model as fitted (delta 0.4, sigma 0.4), not the profile's hull" in lines
+    assert sum("than the profile's hull here" in line for line in lines) == 3
+    assert not shown(render_evaluation(own), "profile's hull")
+
+
+@pytest.mark.slow
+def test_a_fit_on_a_scaled_base_is_judged_against_the_hull_of_the_profile_too(
+    fitted: FitOutcome, tmp_path: Path
+) -> None:
+    assert "base model as fitted (delta 0.4, sigma 0.4)" in headline_of(fitted)
+    (told,) = [reason for reason in fitted.acceptance.reasons if reason.startswith("Beside the profile's hull")]
+    assert told in fitted.acceptance.reasons
+    # The log is of that very hull, so that no fit to ninety seconds of it is better.
+    assert "% above:" in told
+    plain = fit_logs([str(LOG)], load_profile("milliampere"), FitSettings(draws=1), RunContext(tmp_path))
+    assert "as fitted" not in headline_of(plain)
+    assert not [reason for reason in plain.acceptance.reasons if "profile's hull" in reason]
+
+
+def test_a_rejected_model_is_not_judged_without_a_word() -> None:
+    warning = "warning: this model is marked as rejected, as its fit was not accepted"
+    head = {**HEAD, "logs": []}
+    assert warning in render_evaluation({**head, "model": {**HEAD["model"], "accepted": False}}).splitlines()
+    assert warning not in render_evaluation({**head, "model": {**HEAD["model"], "accepted": True}})
