@@ -41,6 +41,7 @@ from ferryid.files import alone, dump_json, remove_abandoned, write_text
 from ferryid.ingest import open_log
 from ferryid.ingest.hashing import content_hash
 from ferryid.models import Model, model_to_json
+from ferryid.report.batch_findings import found_in
 from ferryid.report.batch_page import render, timelines
 from ferryid.report.batch_rows import BatchResult, Change, MemoryUse
 from ferryid.report.diagnosis_report import patient
@@ -357,6 +358,8 @@ def render_batch(result: BatchResult) -> str:
     verdicts = Counter(row.diagnose.verdict for row in result.rows if row.diagnose)
     if verdicts:
         lines.append("  " + ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in sorted(verdicts.items())))
+    if found := found_in(result.rows):
+        lines.append(f"  {found}")
     fits = [row.fit for row in result.rows if row.fit]
     if fits:
         lines.append(f"  {sum(fit.accepted for fit in fits)} of {len(fits)} fits accepted")

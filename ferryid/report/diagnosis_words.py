@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import exp, isfinite, log
+from math import exp, hypot, isfinite, log
 from pathlib import PurePath
 
 from ferryid.counts import counted
@@ -64,6 +64,10 @@ def title(effect: str, instance: str | None = None) -> str:
     return titled(name, instance)
 
 
+APART = 0.1
+"""Share of the squared force error by which a finding alone may remove more than all do, before the headline says why."""
+
+
 def headline(diagnosis: Diagnosis) -> str:
     """Return the verdict in one sentence."""
     every = [one for one in diagnosis.findings if one.effect != UNKNOWN]
@@ -76,7 +80,11 @@ def headline(diagnosis: Diagnosis) -> str:
     parts = [f"{left_out} {listed(physics)}"] if physics else []
     parts += [f"the sensors have faults, corrected here: {listed(sensors)}"] if sensors else []
     names = "; ".join(parts) + (f"; perhaps also {doubtful}" if doubtful else "")
-    change = changed({axis: 1.0 - ratio.value for axis, ratio in ratio_of(diagnosis).items()})
+    removed = {axis: 1.0 - ratio.value for axis, ratio in ratio_of(diagnosis).items()}
+    change = changed(removed)
+    if any(one.improvement.get(axis, 0.0) > share + APART for one in named for axis, share in removed.items()):
+        # A finding's own figure is of the same hull without it, and this one of the hull that makes up for all of them.
+        change += f" from what a hull refitted without {'them' if len(named) > 1 else 'it'} leaves"
     them = "them" if len(physics) + len(every) - len(named) > 1 else "it"
     told = f"; with {them}, the squared force error on held-out data {change}"
     more = told if change and physics and fitted(diagnosis) else ""
@@ -283,8 +291,34 @@ def rivals(finding: Finding) -> list[str]:
 
 
 def _sure_name(finding: Finding) -> str:
-    """Return what a sure finding is called within a sentence, with all that cannot be distinguished from it."""
-    return listed([_inline(one) for one in _called(finding)], "or")
+    """Return what a sure finding is called within a sentence, with its size, and all that cannot be distinguished from it."""
+    first, *others = _called(finding)
+    return listed([_inline(sized(first, finding.effect, finding.parameters)), *map(_inline, others)], "or")
+
+
+def sized(name: str, effect: str, parameters: Mapping[str, Estimate]) -> str:
+    """Return the name of a finding with its size behind it in brackets: of a vector its length, else the first parameter."""
+    size = _brief_size(effect, parameters)
+    if not size:
+        return name
+    # A thruster's name stands in brackets already.
+    return f"{name[:-1]}, {size})" if name.endswith(")") else f"{name} ({size})"
+
+
+def _brief_size(effect: str, found: Mapping[str, Estimate]) -> str:
+    """Return the size of a finding in a few words; empty where none is known."""
+    if "north" in found and "east" in found:
+        one = found["north"]
+        return _value(hypot(one.value, found["east"].value), digits_of(one), one.unit)
+    for name, one in found.items():
+        if name not in ("onset", "offset"):
+            called, (value,) = in_words(effect, name, [one])
+            return f"{called} {_value(value.value, digits_of(value), value.unit)}"
+    return ""
+
+
+def _value(value: float, digits: int, unit: str) -> str:
+    return f"{value:.{digits}f}" + ("" if unit in ("-", "") else f" {unit}")
 
 
 def _called(finding: Finding) -> list[str]:

@@ -245,10 +245,20 @@ def test_the_letter_has_its_order() -> None:
 
 def test_a_verdict_is_told_with_what_changed() -> None:
     assert headline(diagnosis("explained")) == (
-        "Explained: the model left out steady wind or current and thruster force (thruster1); with them, the squared force "
-        "error on held-out data falls by 75 % in surge, 90 % in sway and 95 % in yaw."
+        "Explained: the model left out steady wind (4.23 m/s) or current and thruster force (thruster1, factor 0.850); "
+        "with them, the squared force error on held-out data falls by 75 % in surge, 90 % in sway and 95 % in yaw."
     )
     assert headline(diagnosis("matched")).startswith("Matched: nothing")
+
+
+def test_the_verdict_says_why_all_findings_remove_less_than_one_of_them_alone() -> None:
+    """A hull that is refitted without the findings makes up for some of them."""
+    made = diagnosis("explained")
+    much = replace(made.findings[0], improvement={"surge": 0.9})
+    told = headline(replace(made, findings=(much, *made.findings[1:])))
+    assert told.endswith("and 95 % in yaw from what a hull refitted without them leaves.")
+    little = replace(made.findings[0], improvement={"surge": 0.8})
+    assert headline(replace(made, findings=(little, *made.findings[1:]))).endswith("and 95 % in yaw.")
 
 
 def test_what_no_size_would_have_shown_stands_in_the_verdict() -> None:

@@ -1,0 +1,37 @@
+"""What was found in the logs of a batch in one line: which effects, in how many logs, and of what size."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import nan
+
+from ferryid.counts import counted
+from ferryid.diagnose import JUDGING, UNKNOWN, Estimate
+from ferryid.report.batch_rows import FindingSummary, SummaryRow
+from ferryid.report.diagnosis_words import sized, title
+
+
+def found_in(rows: Sequence[SummaryRow]) -> str:
+    """Return the findings that are more than hints, the commonest first; with its size what only one log has. May be empty."""
+    by_key: dict[tuple[str, str | None], list[FindingSummary]] = {}
+    for row in rows:
+        for one in row.findings:
+            if one.effect != UNKNOWN and one.probability > JUDGING.hint_probability:
+                by_key.setdefault(one.key, []).append(one)
+    every = sorted(by_key.values(), key=len, reverse=True)
+    told = ", ".join(f"{_named(some)} in {counted(len(some), 'log')}" for some in every)
+    return f"{told[:1].upper()}{told[1:]}" if told else ""
+
+
+def _named(some: Sequence[FindingSummary]) -> str:
+    first = some[0]
+    name = title(first.effect, first.instance)
+    name = name[:1].lower() + name[1:]
+    if len(some) > 1:
+        return name
+    known = {
+        key: Estimate(one.value, nan if one.low is None else one.low, nan if one.high is None else one.high, one.unit)
+        for key, one in first.parameters.items()
+        if one.value is not None
+    }
+    return sized(name, first.effect, known)
