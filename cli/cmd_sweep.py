@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -29,6 +30,7 @@ from ferryid.cli.options import (
     ranges,
 )
 from ferryid.cli.output import emit, progress, tell
+from ferryid.errors import FerryIdError
 
 
 def command(
@@ -77,6 +79,11 @@ def command(
         basis=basis, structure=structure, components=components, window_s=window, smoother=smoother, residual=residual,
         inertia=inertia, rate_hz=rate, delta=delta, sigma=sigma, zeta=zeta, estimator=estimator, weak_window_s=weak_window,
     )  # fmt: skip
+    if Path(what).exists():
+        raise FerryIdError(
+            f"{what}: a log stands where WHAT does, which says what is swept. Fix: ferryid sweep components {what}, or "
+            "window, both or basis in the place of components"
+        )
     chosen = logs or () if archive else given(logs)
     outcome = api.sweep(
         what,

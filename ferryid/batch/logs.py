@@ -12,12 +12,14 @@ from pathlib import Path
 from ferryid.batch.log_result import LogFile
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError, did_you_mean
-from ferryid.ingest import existing_parts
+from ferryid.ingest import existing_parts, log_suffixes
 
 COLUMNS = ("log", "vessel", "date", "note")
 """Of a manifest that is a table; `log` is what makes it one."""
 LISTS = (".csv", ".txt", ".list")
 """How files end that may be manifests."""
+METADATA = "metadata.yaml"
+"""Of a folder that is one recording of ROS 2, which says itself what its parts are."""
 _LIKE_LOG = ("logs", "path", "paths", "file", "files", "filename", "bag", "recording")
 LARGEST_BYTES = 64 << 20
 """Of a manifest; a million paths are less."""
@@ -127,7 +129,20 @@ def _entries(one: str, vessel: str | None, tell: Callable[[str], None]) -> Itera
             f"{one}: nothing is there that this matches. Fix: check the path; put a pattern in quotes, such as "
             '"season/**/*.mcap"'
         )
+    _tell_of_parts(path, tell)
     yield from (Entry(log, vessel) for log in logs)
+
+
+def _tell_of_parts(path: Path, tell: Callable[[str], None]) -> None:
+    """Tell that the recordings in a folder are parts of one, as everywhere, and how each is a log of its own."""
+    if not _exists(path) or not path.is_dir() or (path / METADATA).is_file():
+        return
+    parts = sum(file.name.endswith(log_suffixes(parts=True)) for file in path.iterdir())
+    if parts > 1:
+        tell(
+            f"{path}: its {parts} recordings are taken as parts of one log; if each is a log of its own, name them: "
+            f'"{path}/*"'
+        )
 
 
 def _logs(one: str) -> list[str]:

@@ -42,6 +42,18 @@ def test_patterns_paths_folders_and_parts(season: Path) -> None:
     assert Entry("season/p+q.mcap").paths == [season / "p+q.mcap"]
 
 
+def test_recordings_in_a_folder_are_parts_of_one_and_that_is_told(season: Path) -> None:
+    told: list[str] = []
+    assert [one.log for one in entries_of(["season/sub"], "x", told.append)] == ["season/sub"]
+    assert told == [
+        "season/sub: its 2 recordings are taken as parts of one log; if each is a log of its own, name them: "
+        '"season/sub/*"'
+    ]
+    (season / "sub" / "metadata.yaml").write_text("")
+    entries_of(["season/sub", "season/*.mcap"], "x", told.append)
+    assert len(told) == 1
+
+
 def test_a_log_that_is_asked_for_twice_is_one(season: Path) -> None:
     assert named("season/*.mcap", season / "b.mcap", "season/../season/a.mcap") == named("season/*.mcap")
 

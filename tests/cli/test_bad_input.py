@@ -174,6 +174,11 @@ def test_what_cannot_be_swept(
     assert not (tmp_path / "reports").exists()
 
 
+def test_a_log_in_the_place_of_what_is_swept_is_told(ferryid, fixtures: Path) -> None:
+    log = fixtures / "short.mcap"
+    refused(ferryid("sweep", log), f"{log}: a log stands where WHAT does", f"Fix: ferryid sweep components {log}")
+
+
 @pytest.mark.parametrize("command", [("fit",), ("sweep", "components"), ("sweep", "basis")])
 def test_a_log_given_twice(
     ferryid, fixtures: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: tuple[str, ...]
