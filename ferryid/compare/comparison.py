@@ -322,9 +322,9 @@ def _models_that_run(candidates: Sequence[Candidate], compared: Sequence[Compare
         if not came:
             notes.append(f"{one.label} is left out of free runs: {NO_MASS}, or all its runs diverge")
         elif not runs[k]:
-            notes.append(f"{one.label} is left out of free runs: {lost:.0%} of its runs diverge")
+            notes.append(f"{one.label} is left out of free runs: {100.0 * lost:.0f} % of its runs diverge")
         elif lost:
-            notes.append(f"{lost:.1%} of the free runs of {one.label} diverge, and count for no model")
+            notes.append(f"{100.0 * lost:.1f} % of the free runs of {one.label} diverge, and count for no model")
     return runs, notes
 
 

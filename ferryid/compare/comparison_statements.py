@@ -112,7 +112,9 @@ def _statement(
     if not isfinite(ratio):
         says = f"{first} and {second} cannot be compared {place}: one of them makes no error, or there is nothing to judge by"
     elif alike:
-        says = f"{first} and {second} are alike {place}: their {error} differs by less than {COMPARE.alike:.1%}"
+        says = (
+            f"{first} and {second} are alike {place}: their {error} differs by less than {100.0 * COMPARE.alike:.1f} %"
+        )
     elif not known:
         says = f"too little data to distinguish {first} from {second} {place}: {error} {ratio:.3g} of the other's"
     elif clear:

@@ -208,7 +208,7 @@ def range_warnings(model: Model, motion: Motion, rows: Flags) -> list[str]:
         if share > COMPARE.outside:
             low, high = model.ranges[name]
             warnings.append(
-                f"{share:.0%} of the rows have {name} outside the model's range of validity, {low:.3g} to {high:.3g} "
+                f"{100.0 * share:.0f} % of the rows have {name} outside the model's range of validity, {low:.3g} to {high:.3g} "
                 f"{RANGE_UNITS[name]}"
             )
     return warnings

@@ -51,6 +51,6 @@ def beside_profile(model: Model, profile: Profile, logs: Sequence[LogFit]) -> tu
         return ()
     mean = float(np.mean(list(known.values())))
     return (
-        f"Beside the profile's hull, not scaled, the squared prediction error on the same data is {abs(mean):.1%} "
+        f"Beside the profile's hull, not scaled, the squared prediction error on the same data is {100.0 * abs(mean):.1f} % "
         f"{'below' if mean < 0.0 else 'above'}: {', '.join(f'{axis} {100.0 * one:+.1f} %' for axis, one in known.items())}.",
     )

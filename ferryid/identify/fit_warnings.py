@@ -59,7 +59,7 @@ def general_warnings(settings: FitSettings, known: Excitation, scores: ModelScor
     warnings = []
     if np.isfinite(known.heading_coverage) and known.heading_coverage < 0.5:
         warnings.append(
-            f"Headings cover only {known.heading_coverage:.0%} of the compass: a steady wind or current could not be "
+            f"Headings cover only {100.0 * known.heading_coverage:.0f} % of the compass: a steady wind or current could not be "
             "separated from the hull."
         )
     if known.undetermined:

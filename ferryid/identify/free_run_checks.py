@@ -88,7 +88,7 @@ def _at_horizon(
         mean, low, high = paired_interval(after - before, clusters)
         reason = (
             f"After {horizon_s:g} s of free run the mean {label} error is {after.mean():.3g} {unit}, the {reference}'s "
-            f"{before.mean():.3g} {unit}: a difference of {mean:+.3g} {unit} ({IDENTIFY.free_run_level:.0%} interval "
+            f"{before.mean():.3g} {unit}: a difference of {mean:+.3g} {unit} ({100.0 * IDENTIFY.free_run_level:.0f} % interval "
             f"{low:+.3g} to {high:+.3g}, {counted(len(before), 'run')} in {stretches} held-out blocks)"
             + (". The interval must reach below zero: the model predicts motion worse there." if low > 0.0 else ".")
         )

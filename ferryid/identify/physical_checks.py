@@ -120,7 +120,8 @@ def damping_checks(force: Callable[[Floats], Floats], visited: Floats) -> tuple[
                 share,
                 IDENTIFY.damping_rows,
                 "of the rows",
-                f"{where} adds energy on {share:.1%} of the rows {at}, and {IDENTIFY.damping_rows:.0%} is allowed: {meaning}",
+                f"{where} adds energy on {100.0 * share:.1f} % of the rows {at}, and {100.0 * IDENTIFY.damping_rows:.0f} % is "
+                f"allowed: {meaning}",
             )
         )
     return tuple(checks)

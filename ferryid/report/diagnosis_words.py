@@ -82,7 +82,8 @@ def headline(diagnosis: Diagnosis) -> str:
     names = "; ".join(parts) + (f"; perhaps also {doubtful}" if doubtful else "")
     removed = {axis: 1.0 - ratio.value for axis, ratio in ratio_of(diagnosis).items()}
     change = changed(removed)
-    if any(one.improvement.get(axis, 0.0) > share + APART for one in named for axis, share in removed.items()):
+    apart = {axis: share for axis, share in removed.items() if share > -JUDGING.reported_change}
+    if any(one.improvement.get(axis, 0.0) > share + APART for one in named for axis, share in apart.items()):
         # A finding's own figure is of the same hull without it, and this one of the hull that makes up for all of them.
         change += f" from what a hull refitted without {'them' if len(named) > 1 else 'it'} leaves"
     them = "them" if len(physics) + len(every) - len(named) > 1 else "it"
@@ -290,10 +291,12 @@ def rivals(finding: Finding) -> list[str]:
     return lines
 
 
-def _sure_name(finding: Finding) -> str:
+def _sure_name(finding: Finding, *, sizes: bool = True) -> str:
     """Return what a sure finding is called within a sentence, with its size, and all that cannot be distinguished from it."""
     first, *others = _called(finding)
-    return listed([_inline(sized(first, finding.effect, finding.parameters)), *map(_inline, others)], "or")
+    if sizes:
+        first = sized(first, finding.effect, finding.parameters)
+    return listed([_inline(one) for one in (first, *others)], "or")
 
 
 def sized(name: str, effect: str, parameters: Mapping[str, Estimate]) -> str:
@@ -372,8 +375,9 @@ def summary(diagnoses: Sequence[Diagnosis]) -> str:
     ]
     every = [finding for one in diagnoses for finding in one.findings]
     named = [one for one in every if one.effect != UNKNOWN]
-    sure = list(dict.fromkeys(_sure_name(one) for one in named if one.sure and one.effect in effects()))
-    sensors = dict.fromkeys(_sure_name(one) for one in named if one.sure and one.effect not in effects())
+    # Sizes differ from log to log.
+    sure = list(dict.fromkeys(_sure_name(one, sizes=False) for one in named if one.sure and one.effect in effects()))
+    sensors = dict.fromkeys(_sure_name(one, sizes=False) for one in named if one.sure and one.effect not in effects())
     doubtful = dict.fromkeys(_inline(title(one.effect, one.instance)) for one in named if not one.sure)
     known = {_inline(name) for one in named if one.sure for name in _called(one)}
     perhaps = [one for one in doubtful if one not in known]

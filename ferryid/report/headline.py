@@ -22,7 +22,7 @@ def headline_of(result: FitOutcome) -> str:
         told = f"its {result.scores.measure} error could not be compared with the base model's"
     else:
         word = "below" if change < 0 else "above"
-        told = f"mean square {result.scores.measure} error {abs(change):.1%} {word} {base} on data it did not see"
+        told = f"mean square {result.scores.measure} error {100.0 * abs(change):.1f} % {word} {base} on data it did not see"
     count = len(result.warnings)
     trust = (
         f" Read the {counted(count, 'warning')} first." if count > 1 else " Read the warning first." if count else ""

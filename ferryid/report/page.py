@@ -354,7 +354,7 @@ def _excitation_lines(result: FitOutcome) -> list[str]:
             f"as the strongest, and {weak} are below a thousandth."
         )
     if np.isfinite(excitation.heading_coverage):
-        lines.append(f"Headings cover {excitation.heading_coverage:.0%} of twelve 30° sectors.")
+        lines.append(f"Headings cover {100.0 * excitation.heading_coverage:.0f} % of twelve 30° sectors.")
     known = [k for k, term in enumerate(result.model.terms) if term not in excitation.undetermined]
     best = sorted(known, key=lambda k: -excitation.vip[k])[:5]
     names = ", ".join(f"{result.model.terms[k]} ({excitation.vip[k]:.1f})" for k in best)

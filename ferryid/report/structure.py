@@ -132,7 +132,7 @@ def remainder(log: LogFit) -> list[str]:
         offset = float(values.mean())
         sentence = (
             f"{log.motion.log}, {axis}: {float(np.sqrt(np.mean(values**2))):.3g} {unit} rms remain (mean {offset:+.3g}), "
-            f"with a memory of {memory}; {slow:.0%} of its power is slower than {1 / SLOW_HZ:.0f} s."
+            f"with a memory of {memory}; {100.0 * slow:.0f} % of its power is slower than {1 / SLOW_HZ:.0f} s."
         )
         if slow > 0.5:
             sentence += " Noise is not that slow: a steady load such as wind or current, or a missing term, is left."

@@ -100,7 +100,7 @@ def test_what_is_not_shown_is_one_sentence_for_two_models() -> None:
 def test_alike_is_what_differs_by_next_to_nothing_however_surely() -> None:
     row = result(("one", "two"), 0.0001, step=1.004).statements[0]
     assert row.better is None
-    assert row.sentence == "one and two are alike on surge: their prediction MSE differs by less than 0.5%"
+    assert row.sentence == "one and two are alike on surge: their prediction MSE differs by less than 0.5 %"
 
 
 def test_many_models_are_held_against_the_best() -> None:

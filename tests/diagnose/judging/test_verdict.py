@@ -184,8 +184,8 @@ def test_the_axis_that_gets_worse_is_named() -> None:
         remainder=remainder,
     )  # fmt: skip
     assert headline(one) == (
-        "Partly explained: the model left out steady wind or current; with it, the squared force error on held-out data falls "
-        "by 27 % in surge and rises by 333 % in sway. In sway the findings make the force error larger."
+        "Partly explained: the model left out steady wind (value 1.00) or current; with it, the squared force error on "
+        "held-out data falls by 27 % in surge and rises by 333 % in sway. In sway the findings make the force error larger."
     )
 
 
