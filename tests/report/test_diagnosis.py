@@ -229,7 +229,7 @@ def test_the_letter_has_its_order() -> None:
     places = [
         page.index(text)
         for text in (
-            "Explained: the model left out steady wind or current and thruster force (thruster1)",
+            "Explained: the model left out steady wind (4.23 m/s) or current and thruster force (thruster1, factor 0.850)",
             wind().says,
             "North -3.02 m/s",
             "<svg",
@@ -365,7 +365,7 @@ def nameless() -> Finding:
 @pytest.mark.blank
 def test_what_has_no_name_is_no_fault_of_the_sensors() -> None:
     one = replace(diagnosis("partly_explained"), findings=(wind(), nameless()))
-    assert headline(one).startswith("Partly explained: the model left out steady wind or current; with it,")
+    assert headline(one).startswith("Partly explained: the model left out steady wind (4.23 m/s) or current; with it,")
     assert "sensors" not in headline(one)
     page, drawings = render((one,), "trial")
     assert "2. Something without a name" in page
