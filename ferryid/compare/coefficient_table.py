@@ -6,23 +6,11 @@ from collections.abc import Sequence
 
 from ferryid.compare.candidates import Candidate
 from ferryid.compare.comparison_result import Coefficient, CoefficientRow, EffectInModel, EffectRow, TermRow
-from ferryid.effects.force_model import COEFFICIENTS, LIFT, MASS, UNITS
 from ferryid.models import Model, StoredEffect
-from ferryid.models.coefficients import coefficient_intervals, opposite, term_interval
-from ferryid.models.forces import MAPPED, model_estimator
-from ferryid.types import AXES, Floats
+from ferryid.models.coefficients import CUBES, EQUATION_UNITS, PRODUCTS, equation_coefficients
+from ferryid.models.forces import MAPPED
+from ferryid.types import AXES
 
-PRODUCTS = (
-    ("vr in surge", "vr", 0, "kg"),
-    ("rr in surge", "rr", 0, "kg·m"),
-    ("uv in sway", "uv", 1, "kg/m"),
-    ("ur in sway", "ur", 1, "kg"),
-    ("uv in yaw", "uv", 2, "kg"),
-    ("ur in yaw", "ur", 2, "kg·m"),
-)
-"""Products of two velocities, their term, axis and unit: Coriolis force and lift, which no log can tell apart."""
-CUBES = (("Y_rrr", "r^3", 1, "kg·m·s"), ("N_vvv", "v^3", 2, "kg·s/m"))
-"""Damping that no profile has and a fit may find."""
 CONSTANT = "1"
 """Name of the constant among the terms, as in a model file."""
 
@@ -39,38 +27,13 @@ def coefficient_rows(candidates: Sequence[Candidate]) -> tuple[CoefficientRow, .
 
     and the terms that are no hull's, such as the constant, come on top. Intervals are 95 %; a base model has none.
     """
-    known = [_effective(one.model) for one in candidates]
+    known = [equation_coefficients(one.model) for one in candidates]
     rows = []
-    for name, unit in _UNITS.items():
+    for name, unit in EQUATION_UNITS.items():
         values = {one.label: Coefficient(*found[name].tolist()) for one, found in zip(candidates, known, strict=True)}
         if any(one.value != 0.0 for one in values.values()):
             rows.append(CoefficientRow(name, unit, values))
     return tuple(rows)
-
-
-_HULL = dict(zip(COEFFICIENTS, UNITS, strict=True))
-_UNITS = {
-    **{name: _HULL[name] for name in MASS},
-    **{name: unit for name, _, _, unit in PRODUCTS},
-    **{name: unit for name, unit in _HULL.items() if name not in (*MASS, *LIFT)},
-    **{name: unit for name, _, _, unit in CUBES},
-}
-
-
-def _effective(model: Model) -> dict[str, Floats]:
-    """Return value, low and high of every coefficient, shape (3,) each."""
-    found = coefficient_intervals(model)
-    force = model_estimator(model)
-    # The Coriolis force is that of the base model's mass: a correction of the inertia does not reach it.
-    M = force.profile.hull.M * force.scale.get("delta", 1.0) / force.scale.get("zeta", 1.0)
-    m11, m22, cross = M[0, 0], M[1, 1], (M[1, 2] + M[2, 1]) / 2.0
-    coriolis = (-m22, -cross, 0.0, m11, m22 - m11, cross)
-    for (name, term, axis, _), turning in zip(PRODUCTS, coriolis, strict=True):
-        lift = f"{'XYN'[axis]}_{term}"
-        found[name] = turning + (opposite(found[lift]) if lift in LIFT else term_interval(model, term, axis))
-    for name, term, axis, _ in CUBES:
-        found[name] = opposite(term_interval(model, term, axis))
-    return found
 
 
 def term_rows(candidates: Sequence[Candidate]) -> tuple[TermRow, ...]:

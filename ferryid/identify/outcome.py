@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ferryid.identify.acceptance import Acceptance
 from ferryid.identify.log_condition import KindOutcome, LogCondition, conditions_json
+from ferryid.identify.thresholds import IDENTIFY
 from ferryid.models import Model, ModelScores
 from ferryid.models.prediction import FreeRun
 from ferryid.signals.track import Motion
@@ -245,6 +246,20 @@ class FitOutcome:
     winds: tuple[LogWind, ...] = ()
     conditions: tuple[LogCondition, ...] = ()
     condition_kinds: tuple[KindOutcome, ...] = ()
+
+    @property
+    def base_fits_already(self) -> float | None:
+        """Least R² of the base model's axes where it fits so well, and the new one errs about as much; None elsewhere.
+
+        A base model that was scaled does not count: whoever scales it wants it to be corrected.
+        """
+        known = self.scores.force.r2_base[np.isfinite(self.scores.force.r2_base)]
+        changed = abs(self.acceptance.normalised_mse - 1.0)
+        scaled = any(factor != 1.0 for factor in self.model.scale.values())
+        if self.acceptance.accepted or scaled or not known.size or not changed < IDENTIFY.improvement:
+            return None
+        least = float(known.min())
+        return least if least >= IDENTIFY.fits_already else None
 
     def conditions_by_log(self) -> list[dict[str, Any]]:
         """Return wind and other conditions as plain values, one entry a log that has any."""

@@ -222,6 +222,12 @@ class IdentifyThresholds:
     gust_time_s: float = threshold(
         20.0, "s", "time constant of gusts", "convention: longer than a vessel's windows, shorter than a trial"
     )
+    fits_already: float = threshold(
+        0.9,
+        "-",
+        "R² of the base model on every axis from which on a fit that is no better has nothing to improve",
+        "convention: what is left is mostly noise and weather",
+    )
     fewest_condition_logs: int = threshold(
         3, "logs", "from which conditions besides wind are estimated", "convention: two say nothing of a spread"
     )

@@ -1,14 +1,18 @@
-"""What was found in the logs of a batch in one line: which effects, in how many logs, and of what size."""
+"""What was found in the logs of a batch, each in one line: effects, in how many logs, of what size; and damaged logs."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from math import nan
+from pathlib import PurePath
 
 from ferryid.counts import counted
 from ferryid.diagnose import JUDGING, UNKNOWN, Estimate
 from ferryid.report.batch_rows import FindingSummary, SummaryRow
 from ferryid.report.diagnosis_words import sized, title
+
+NAMED = 5
+"""Logs that are named in a line; the others are counted."""
 
 
 def found_in(rows: Sequence[SummaryRow]) -> str:
@@ -21,6 +25,17 @@ def found_in(rows: Sequence[SummaryRow]) -> str:
     every = sorted(by_key.values(), key=len, reverse=True)
     told = ", ".join(f"{_named(some)} in {counted(len(some), 'log')}" for some in every)
     return f"{told[:1].upper()}{told[1:]}" if told else ""
+
+
+def losses_in(rows: Sequence[SummaryRow]) -> str:
+    """Return how many logs are damaged, and which: a log that was cut is done like any other, but not whole. Empty without."""
+    damaged = [
+        PurePath(row.log).name for row in rows if row.lost is not None and (row.lost.messages or row.lost.unknown)
+    ]
+    if not damaged:
+        return ""
+    more = f" and {len(damaged) - NAMED} more" if len(damaged) > NAMED else ""
+    return f"{counted(len(damaged), 'log')} damaged, of which some is lost: {', '.join(damaged[:NAMED])}{more}"
 
 
 def _named(some: Sequence[FindingSummary]) -> str:

@@ -31,4 +31,14 @@ def headline_of(result: FitOutcome) -> str:
         return f"Accepted: {told}.{trust}"
     failed = [check for check in result.acceptance.checks if check.passed is False]
     why = f", but {counted(len(failed), 'condition')} {verb(len(failed), 'fails')}" if failed and change < 0 else ""
-    return f"Not accepted: {told}{why}."
+    return f"Not accepted: {told}{why}.{_nothing_to_improve(result)}"
+
+
+def _nothing_to_improve(result: FitOutcome) -> str:
+    """Return that the base model serves as it is, where that is why the new one is not better: it is no failure of the log."""
+    least = result.base_fits_already
+    return (
+        ""
+        if least is None
+        else f" Nothing to improve: the base model fits already (R² {least:.2f} or more on every axis)."
+    )

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ferryid.counts import counted
 from ferryid.models import Model, fitted_conditions, model_to_json
+from ferryid.models.coefficients import EQUATION_UNITS, equation_coefficients
 from ferryid.models.store import Change
 from ferryid.types import AXES
 
@@ -75,7 +79,9 @@ def render_model(model: Model) -> str:
         f"validation {measure} MSE over the base model's: {_number(mean)} ("
         + ", ".join(f"{axis} {_number(value)}" for axis, value in zip(AXES, ratio, strict=True))
         + ")",
+        *_equations(model),
         "",
+        "correction of the base model, term by term, as the model file has it (95 % intervals)",
         f"{'term':<{wide}}{'axis':<7}{'value':>13}{'low':>13}{'high':>13}  unit",
     ]
     for axis in AXES:
@@ -97,6 +103,26 @@ def render_model(model: Model) -> str:
     for known in model.conditions:
         lines += ["", f"only in {known.log}:", *(f"  {stored.says(known.sha256)}" for stored in known.effects)]
     return "\n".join(lines)
+
+
+def _equations(model: Model) -> list[str]:
+    """Return the coefficients of the equations of motion as a table: in the model, in the base model, and the change."""
+    found = equation_coefficients(model)
+    before = equation_coefficients(replace(model, hull={}, theta=np.zeros_like(model.theta)))
+    lines = [
+        "",
+        "equations of motion, base model and correction together (95 % intervals)",
+        f"{'coefficient':<14}{'value':>13}{'low':>13}{'high':>13}{'base model':>13}{'change':>10}  unit",
+    ]
+    for name, unit in EQUATION_UNITS.items():
+        # No negative zero, which an opposite of none is.
+        (value, low, high), base = found[name].tolist(), float(before[name][0]) + 0.0
+        if value == 0.0 and base == 0.0:
+            continue
+        ends = "".join(f"{end:>13.5g}" if math.isfinite(end) else f"{'-':>13}" for end in (low, high))
+        change = f"{100.0 * (value / base - 1.0):+.1f} %" if base else "-"
+        lines.append(f"{name:<14}{value:>13.5g}{ends}{base:>13.5g}{change:>10}  {unit}")
+    return lines
 
 
 def describe_settings(model: Model) -> str:

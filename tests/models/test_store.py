@@ -219,3 +219,17 @@ def test_what_a_fit_estimated_of_single_logs_is_listed_and_shown(tmp_path: Path)
     # It is the fit's own verdict all the same.
     assert "accepted" in listed.splitlines()[1]
     assert f"  log: {current}" in render_model(model).splitlines()
+
+
+def test_a_model_is_shown_by_its_equations_of_motion_beside_the_base_model() -> None:
+    """What a correction adds means little without what it is added to."""
+    model = made()
+    lines = render_model(model).splitlines()
+    (row,) = (line for line in lines if line.startswith("m11 "))
+    value, low, high, base, change, per_cent, unit = row.split()[1:]
+    assert (per_cent, unit) == ("%", "kg")
+    assert float(low) < float(value) < float(high)
+    added = float(model.theta[model.terms.index("u_dot"), 0])
+    assert float(value) - float(base) == pytest.approx(added, rel=1e-3, abs=0.1)
+    assert float(change) == pytest.approx(100.0 * added / float(base), abs=0.06)
+    assert lines.index(row) < next(k for k, line in enumerate(lines) if line.startswith("term "))

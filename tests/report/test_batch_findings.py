@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ferryid.report.batch_findings import found_in
+from ferryid.report.batch_findings import found_in, losses_in
 from tests.batch.rows import finding, row
 
 
@@ -20,3 +20,13 @@ def test_findings_are_counted_and_sized_and_hints_left_out() -> None:
 
 def test_a_vector_is_told_by_its_length() -> None:
     assert found_in([row("a", findings=(finding("wind", north=3.0, east=4.0),))]) == "Steady wind (5.0) in 1 log"
+
+
+def test_logs_that_are_not_whole_are_named_though_they_are_done() -> None:
+    lost = {"messages": 12, "seconds": 3.2, "unknown": False, "rows_left_out": 0, "seconds_left_out": 0.0, "says": []}
+    whole = {**lost, "messages": 0, "rows_left_out": 9}
+    rows = [row("trials/a.mcap", lost=lost), row("b.mcap", 2, lost=whole), row("c.mcap", 3)]
+    assert losses_in(rows) == "1 log damaged, of which some is lost: a.mcap"
+    many = [row(f"{k}.mcap", lost={**whole, "unknown": True}) for k in range(7)]
+    assert losses_in(many) == "7 logs damaged, of which some is lost: 0.mcap, 1.mcap, 2.mcap, 3.mcap, 4.mcap and 2 more"
+    assert losses_in(rows[1:]) == ""

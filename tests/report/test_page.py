@@ -84,6 +84,36 @@ def test_conditions_that_the_data_say_nothing_of_are_counted_apart() -> None:
     assert _held([True, False]) == "1 of 2 hold"
 
 
+@pytest.mark.parametrize(
+    ("r2", "change", "scale", "told"),
+    [
+        (
+            (0.96, 0.91, 0.99),
+            0.98,
+            {},
+            " Nothing to improve: the base model fits already (R² 0.91 or more on every axis).",
+        ),
+        (
+            (0.96, 0.91, np.nan),
+            1.03,
+            {},
+            " Nothing to improve: the base model fits already (R² 0.91 or more on every axis).",
+        ),
+        ((0.96, 0.89, 0.99), 0.98, {}, ""),
+        ((0.96, 0.91, 0.99), 1.06, {}, ""),
+        ((0.96, 0.91, 0.99), 0.98, {"delta": 0.4}, ""),
+    ],
+)
+def test_where_the_base_model_fits_already_there_is_nothing_to_improve(
+    result: FitOutcome, r2: tuple[float, ...], change: float, scale: dict[str, float], told: str
+) -> None:
+    fitting = replace(result.scores, force=replace(result.scores.force, r2_base=np.array(r2)))
+    rejected = replace(result.acceptance, accepted=False, normalised_mse=change)
+    one = replace(result, scores=fitting, acceptance=rejected, model=replace(result.model, scale=scale))
+    assert ("Nothing to improve" in headline_of(one)) == bool(told)
+    assert headline_of(one).endswith(told)
+
+
 @pytest.mark.blank
 def test_a_model_that_is_not_accepted_is_told_so(result: FitOutcome) -> None:
     rejected = replace(result, acceptance=replace(result.acceptance, accepted=False))
