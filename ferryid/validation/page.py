@@ -149,7 +149,10 @@ def _winds_apart(found: Sequence[EstimateErrors]) -> str:
     )
     if not winds or not rest:
         return ""
-    return f"{percent(float(np.median(winds)))} of {len(winds)} winds, {percent(float(np.median(rest)))} of {len(rest)} others"
+    return ", ".join(
+        f"{percent(float(np.median(errors)))} of {counted(len(errors), name)}"
+        for errors, name in ((winds, "wind"), (rest, "other"))
+    )
 
 
 def _claim(one: Claim) -> tuple[Any, ...]:

@@ -144,7 +144,7 @@ def test_campaigns_at_sea_have_a_section_of_their_own() -> None:
     half = found("wind", 3, north=1.0, east=2.0)
     named = replace(every[0].diagnosis, findings=(*every[0].diagnosis.findings, half))
     errors = page(RESULT, score([replace(every[0], diagnosis=named)]))
-    assert "(50.0 % of 1 winds, 0.0 % of 1 others)" in " ".join(errors.split())
+    assert "(50.0 % of 1 wind, 0.0 % of 1 other)" in " ".join(errors.split())
     # Nothing is said of single logs where there are none.
     assert "| clean logs with a wrong name" not in text
     assert "Allowed is `hull_parameters`" not in text

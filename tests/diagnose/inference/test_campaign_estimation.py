@@ -197,7 +197,7 @@ def test_winds_are_confirmed_over_all_logs_and_a_current_is_not() -> None:
         assert east.low < true[1] < east.high
         assert claim.finding.probability > 0.9
     assert judged.claims("d") == ()
-    assert ": confirmed." in note(wind, 3)
+    assert ": confirmed." in note(wind, {"a": 0, "b": 1, "c": 2})
 
 
 def test_a_wind_that_a_current_hides_is_confirmed_beside_it() -> None:
@@ -215,7 +215,9 @@ def test_a_wind_that_a_current_hides_is_confirmed_beside_it() -> None:
         assert not any(claim.finding.rivals for claim in judged.claims(path))
         for name, true in (("wind", wind), ("current", stream)):
             assert [found[name][one].value for one in ("north", "east")] == pytest.approx(true, abs=0.05)
-    assert "estimated with one hull for all 3 beside a current: confirmed." in note(judged.tests[1], 3)
+    assert "estimated with one hull for all 3 beside a current: confirmed." in note(
+        judged.tests[1], {"a": 0, "b": 1, "c": 2}
+    )
 
 
 def test_a_log_that_settled_on_a_wind_from_the_other_side_is_brought_back(monkeypatch: pytest.MonkeyPatch) -> None:
