@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ferryid.errors import FerryIdError
@@ -20,7 +22,7 @@ def fold_error(data: LogData, components: int) -> float:
     """Return the squared prediction error over the base model's on folds of the training rows; see `EstimatorScore.folds`."""
     base, model = np.zeros(3), np.zeros(3)
     for part in _parts(data.split):
-        one = data.fold(part)
+        one = replace(data, split=part)
         try:
             found = estimate_correction(one, components, 0, no_progress).coefficients
         except FerryIdError:

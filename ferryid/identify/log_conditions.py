@@ -60,8 +60,6 @@ class Conditions:
         What the conditions add to the covariance of gains and intercept of the weak form, by axis, shape (3, K + 1, K + 1).
     blown
         The load as a function of the mean wind, of the logs whose wind is estimated, by their numbers.
-    settled
-        What an estimate from part of the same rows begins with; None where nothing was estimated.
     """
 
     wind: Floats
@@ -71,7 +69,6 @@ class Conditions:
     load: tuple[Floats, ...]
     added: Floats
     blown: Mapping[int, BlownLoad] = field(default_factory=dict)
-    settled: Settled | None = None
 
     @classmethod
     def none(cls, windows: Sequence[WeakRows], K: int) -> Conditions:
@@ -100,41 +97,6 @@ class Conditions:
             replace(one, steady=one.steady - load) if load.any() else one
             for one, load in zip(windows, self.load, strict=True)
         )
-
-
-@dataclass(frozen=True, eq=False)
-class Settled:
-    """Hull, winds, spreads and noise of an estimate, which one from part of its logs or rows begins with.
-
-    Spreads and noise stay as they are: they take most of the steps, and are of the logs and not of some of their rows.
-
-    Attributes
-    ----------
-    gains, intercept
-        Of the hull, shape (K, 3) and (3,).
-    sigma, noise
-        Size of the residual [N, N, N·m], shape (3,), and what its correlation multiplies its variance by.
-    factor, offset_spread
-        How much wider than stated the prior of the gains is, and the spread of the intercepts in sizes of the residual.
-    wind_spread, force_spread, gust_spread
-        Of mean winds [m/s], of steady forces in sizes of the residual, and of gusts [m/s].
-    wind
-        Mean winds of the logs [m/s], shape (L, 2); NaN where they were not estimated.
-    posed
-        Axes whose acceleration came from poses, shape (3,): that of others has another noise.
-    """
-
-    gains: Floats
-    intercept: Floats
-    sigma: Floats
-    noise: float
-    factor: float
-    offset_spread: float
-    wind_spread: float
-    force_spread: float
-    gust_spread: float
-    wind: Floats
-    posed: Flags
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,7 +213,6 @@ def estimate_conditions(
     mask: Flags,
     prior_spread: Floats,
     posed: Flags,
-    begin: Settled | None = None,
 ) -> Conditions:
     """Estimate the steady wind of every log in which it was not measured.
 
@@ -273,9 +234,6 @@ def estimate_conditions(
         Standard deviations of the gains of the weak form, shape (K, 3); infinite where nothing is known.
     posed
         Axes whose acceleration comes from poses, shape (3,).
-    begin
-        What was found of these logs by more of their rows; None where they are estimated for the first time. Not used where the
-        acceleration came from something else.
     """
     nothing = Conditions.none(windows, len(terms))
     areas = profile.wind
@@ -290,8 +248,7 @@ def estimate_conditions(
     if not loads:
         return nothing
     problem = _Problem(windows, terms, mask, prior_spread, posed, length_s / STRIDES)
-    begin = begin if begin is not None and np.array_equal(begin.posed, posed) else None
-    wind, covariance = problem.solve(loads, begin)
+    wind, covariance = problem.solve(loads)
     return Conditions(
         wind,
         covariance,
@@ -303,7 +260,6 @@ def estimate_conditions(
         ),
         problem.added(),
         {k: BlownLoad(load, problem.gusts.found[k]) for k, load in loads.items()},
-        problem.found(wind),
     )
 
 
@@ -411,22 +367,16 @@ class _Problem:
                 G[:, column] -= self.gains[self.terms.index(name)]
         return G
 
-    def solve(self, loads: Mapping[int, Load], begin: Settled | None = None) -> tuple[Floats, Floats]:
+    def solve(self, loads: Mapping[int, Load]) -> tuple[Floats, Floats]:
         L = len(self.windows)
         wind, covariance = np.zeros((L, 2)), np.zeros((L, 2, 2))
         places = some_logs([len(one) for one in self.windows])
-        if begin is not None:
-            self._begin_with(begin)
-        elif len(places) == L:
+        if len(places) == L:
             self._step({}, wind)
         else:
-            # Some logs tell the spreads as well as all.
-            some = _Problem([self.windows[k] for k in places], *self._of)
-            winds, _ = some.solve({number: loads[k] for number, k in enumerate(places) if k in loads})
-            self._begin_with(some.found(winds))
+            self._begin_as(places, loads)
         for k, load in loads.items():
-            known = begin is not None and np.isfinite(begin.wind[k]).all()
-            wind[k] = begin.wind[k] if begin is not None and known else self._start(k, load)
+            wind[k] = self._start(k, load)
         for _ in range(IDENTIFY.condition_steps):
             before, hull = wind.copy(), self._hull()
             covariance = self._step(loads, wind)
@@ -437,31 +387,17 @@ class _Problem:
         wind[missing], covariance[missing] = np.nan, np.nan
         return wind, covariance
 
-    def _begin_with(self, found: Settled) -> None:
-        self.settled = True
-        self.gains, self.intercept, self.sigma = found.gains.copy(), found.intercept.copy(), found.sigma
-        self.noise, self.factor, self.offset_spread = found.noise, found.factor, found.offset_spread
-        self.wind_spread, self.force_spread, self.gusts.spread = (
-            found.wind_spread,
-            found.force_spread,
-            found.gust_spread,
-        )
+    def _begin_as(self, places: Sequence[int], loads: Mapping[int, Load]) -> None:
+        """Begin with the hull of some of the logs, and keep the spreads and the noise that were found with it.
 
-    def found(self, wind: Floats) -> Settled:
-        """Return what was found, with the winds (L, 2), for an estimate that begins with it."""
-        return Settled(
-            self.gains,
-            self.intercept,
-            self.sigma,
-            self.noise,
-            self.factor,
-            self.offset_spread,
-            self.wind_spread,
-            self.force_spread,
-            self.gusts.spread,
-            wind,
-            self.posed,
-        )
+        They take most of the steps, and some logs tell them as well as all.
+        """
+        self.settled = True
+        some = _Problem([self.windows[k] for k in places], *self._of)
+        some.solve({number: loads[k] for number, k in enumerate(places) if k in loads})
+        for name in ("gains", "intercept", "sigma", "noise", "factor", "offset_spread", "wind_spread", "force_spread"):
+            setattr(self, name, getattr(some, name))
+        self.gusts.spread = some.gusts.spread
 
     def _start(self, k: int, load: Load) -> Floats:
         """Return the likeliest wind of a log for the hull found so far, of some directions and speeds."""

@@ -191,10 +191,6 @@ class LogData(MotionData):
             return super().scores(found, logs)
         return self.windows.scores(found)
 
-    def fold(self, part: Split) -> Self:
-        """Return the same logs with a part of the training rows held out, and no others."""
-        return replace(self, split=part)
-
     def undivided(self) -> Self | None:
         """Return the same data of which all rows train, where blocks were held out; logs held out whole may test the model."""
         if self.split.kind != "blocks":

@@ -21,12 +21,11 @@ from ferryid.identify.feasible import Feasible, LiftTie, feasible_gains
 from ferryid.identify.fit_data import Estimate
 from ferryid.identify.inertia import relative_inertia, without_inertia
 from ferryid.identify.log_condition import KindOutcome, LogCondition, conditions_json
-from ferryid.identify.log_conditions import Conditions, LoadSamples, Settled, estimate_conditions, sample_load
+from ferryid.identify.log_conditions import Conditions, LoadSamples, estimate_conditions, sample_load
 from ferryid.identify.motion_data import LogData
 from ferryid.identify.outcome import Excitation, LogWind
 from ferryid.identify.prediction_windows import PredictionWindows
 from ferryid.identify.settings import FOLDS
-from ferryid.identify.split import Split
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.weak_rows import WeakRows, to_force
 from ferryid.models.forces import ACCELERATIONS, MAPPED, without_sway_coupling
@@ -92,14 +91,11 @@ class WeakData(LogData):
         Of the kinds of conditions, besides wind, that logs have of their own, the spread between logs in sizes.
     own_kinds
         What spoke for each kind that was considered.
-    begin
-        What the estimate of the winds begins with; None: nothing is known of these logs.
     """
 
     training_s: float | None = field(default=None, kw_only=True)
     own_spreads: Mapping[str, float] = field(default_factory=dict, kw_only=True)
     own_kinds: tuple[KindOutcome, ...] = field(default=(), kw_only=True)
-    begin: Settled | None = field(default=None, kw_only=True)
 
     @cached_property
     def windows(self) -> PredictionWindows:
@@ -139,10 +135,6 @@ class WeakData(LogData):
     def _blown(self) -> tuple[WeakRows, ...]:
         """Training windows as if the wind had been measured."""
         return self.conditions.applied(self.windows.training)
-
-    def fold(self, part: Split) -> Self:
-        """Return the same logs with a part of the training rows held out; their winds are estimated from where these ended."""
-        return replace(self, split=part, begin=self.conditions.settled)
 
     @cached_property
     def own(self) -> OwnConditions | None:
@@ -205,7 +197,6 @@ class WeakData(LogData):
             self.functions.mask,
             self.prior_spread,
             self._posed,
-            self.begin,
         )
 
     @property

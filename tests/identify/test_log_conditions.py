@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ferryid.identify import estimators, log_conditions
+from ferryid.identify import log_conditions
 from ferryid.identify.estimation import estimate_correction
 from ferryid.identify.gusts import Gusts
 from ferryid.identify.log_conditions import Conditions, Load, LoadSamples
@@ -249,33 +249,3 @@ def test_many_logs_begin_as_some_of_them_end(monkeypatch: pytest.MonkeyPatch) ->
     assert steps.count(6) < steps.count(3)
     np.testing.assert_allclose(found.wind, every.wind, atol=0.1)
     np.testing.assert_allclose(found.wind, np.broadcast_to(TRUE, (6, 2)), atol=0.4)
-
-
-def test_winds_of_a_fold_keep_the_spreads_of_all_rows_and_settle_within_few_steps(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    data = data_of([measured(0, seconds=480.0, jitter=0.01, noise=4.0, force=blown)], sigma=0.8)
-    whole, part = data.conditions, estimators._parts(data.split)[0]
-    steps: list[int] = []
-    step = log_conditions._Problem._step
-
-    def counted(self: log_conditions._Problem, *given: Any) -> Floats:
-        steps.append(len(self.windows))
-        return step(self, *given)
-
-    monkeypatch.setattr(log_conditions._Problem, "_step", counted)
-    afresh = replace(data, split=part).conditions
-    needed = len(steps)
-    found = data.fold(part).conditions
-    assert (found.spread_mps, found.gust_mps) == (whole.spread_mps, whole.gust_mps)
-    assert len(steps) - needed < needed / 2
-    assert np.all(np.abs(found.wind - afresh.wind) < np.sqrt(np.diagonal(afresh.covariance, axis1=1, axis2=2)))
-    assert np.any(found.wind != whole.wind)
-
-
-def test_an_estimate_of_other_accelerations_does_not_begin_with_the_noise_of_these() -> None:
-    data = data_of([measured(0, seconds=300.0, jitter=0.01, noise=4.0, force=blown)], sigma=0.8)
-    settled = data.conditions.settled
-    assert settled is not None
-    other = replace(data, begin=replace(settled, posed=~settled.posed, wind_spread=1e-3))
-    np.testing.assert_array_equal(other.conditions.wind, data.conditions.wind)
