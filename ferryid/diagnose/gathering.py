@@ -13,6 +13,7 @@ from ferryid.diagnose.checks.screening import screen_sensors, screen_together
 from ferryid.diagnose.data.measurements import measure_log
 from ferryid.diagnose.data.simulated import simulated
 from ferryid.diagnose.inference.campaign import assemble, repeated
+from ferryid.diagnose.inference.sessions import CLOCK_SET_NS, dated, start_ns
 from ferryid.diagnose.inference.stages import AveragedLog, average
 from ferryid.diagnose.judging.campaign_split import Split, find_split
 from ferryid.diagnose.judging.diagnosis import distinct
@@ -23,8 +24,6 @@ from ferryid.side_by_side import over
 from ferryid.types import RunContext
 from ferryid.vessel.profile import Profile
 
-CLOCK_SET_NS = 946_684_800_000_000_000
-"""Start of the year 2000: earlier times are no dates, but seconds since a log or a clock began."""
 OWN_HULLS = "The campaign is split: each side has a hull of its own, and a model is stored of the latest one."
 STAY = "They stay together here: what changed between them is in neither group's differences, and widens what is not known."
 SHOWN_OVERLAPS = 3
@@ -172,7 +171,7 @@ def _simulated(log: AveragedLog) -> str:
 
 def _clocks(logs: Sequence[AveragedLog]) -> tuple[str, ...]:
     """Return sentences on clocks that some logs did not set, and on times that overlap: no vessel makes two logs at once."""
-    unset = [one.path for one in logs if _start_ns(one) < CLOCK_SET_NS]
+    unset = [one.path for one in logs if start_ns(one) < CLOCK_SET_NS]
     return (*(_unset(unset) if len(unset) < len(logs) else ()), *_overlapping(logs))
 
 
@@ -191,7 +190,7 @@ def _overlapping(logs: Sequence[AveragedLog]) -> tuple[str, ...]:
     spans = sorted(
         (start, start + round(_seconds(one) * 1e9), one.path)
         for one in logs
-        if (start := _start_ns(one)) >= CLOCK_SET_NS
+        if (start := start_ns(one)) >= CLOCK_SET_NS
     )
     overlapping = []
     for k, (_, end, path) in enumerate(spans):
@@ -266,8 +265,7 @@ def whole(gathered: Gathered, profile: Profile, model: Model | None) -> Gathered
 
 def _in_time(logs: Sequence[AveragedLog]) -> list[AveragedLog]:
     """Return logs in order of time; in the order in which they were given where times are no dates."""
-    dated = all(_start_ns(one) >= CLOCK_SET_NS for one in logs)
-    return sorted(logs, key=_start_ns) if dated else list(logs)
+    return sorted(logs, key=start_ns) if dated(logs) else list(logs)
 
 
 def _parted(group: Group, profile: Profile, model: Model | None) -> list[Group]:
@@ -350,10 +348,6 @@ def _halves(group: Group, inside: set[str], outside: set[str], split: Split) -> 
         )
         for logs, side in zip(parts, (inside, outside), strict=True)
     ]
-
-
-def _start_ns(log: AveragedLog) -> int:
-    return log.screened.measured.survey.t0_ns
 
 
 def _seconds(log: AveragedLog) -> float:

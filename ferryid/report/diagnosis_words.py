@@ -316,7 +316,9 @@ def _brief_size(effect: str, found: Mapping[str, Estimate]) -> str:
     for name, one in found.items():
         if name not in ("onset", "offset"):
             called, (value,) = in_words(effect, name, [one])
-            return f"{called} {_value(value.value, digits_of(value), value.unit)}"
+            # What has the name of an axis or of a coefficient and no unit is a factor on it.
+            factor = name in (*AXES, *COEFFICIENTS) and one.unit in ("-", "")
+            return f"{called} {'× ' if factor else ''}{_value(value.value, digits_of(value), value.unit)}"
     return ""
 
 
@@ -352,8 +354,9 @@ def new_model(diagnosis: Diagnosis) -> str:
     label = f"{path.parent.name}@{path.stem}"
     out = path.parents[2] if len(path.parents) > 2 else PurePath(USUAL_OUT)
     where = "" if out == PurePath(USUAL_OUT) else f" --out {out}"
-    learned = diagnosis.learned is not None and diagnosis.posterior is None
-    what = "The model that was learned is" if learned else "The model with the findings is"
+    learned = diagnosis.learned
+    alone = learned is not None and (diagnosis.posterior is None or learned.fit_alone)
+    what = "The model that was learned is" if alone else "The model with the findings is"
     return f"{what} {label}, which is {diagnosis.model}; use it with: ferryid evaluate {label} LOG{where}"
 
 

@@ -171,7 +171,8 @@ NO_DECISION = {
         diagnose.inference.onset_estimation MOST_VALUES LATER_BLOCKS
         diagnose.inference.simulation_baseline SHOWN_ROWS
         diagnose.judging.error_profiles SECTORS SPEEDS PLACES TIMES
-        diagnose.gathering CLOCK_SET_NS SHOWN_OVERLAPS
+        diagnose.gathering SHOWN_OVERLAPS
+        diagnose.inference.sessions CLOCK_SET_NS
         diagnose.judging.findings SHOWN_RIVALS
         diagnose.judging.unexplained SPANS
         identify.archive MOST_DRAWN

@@ -26,7 +26,7 @@ from ferryid.types import AXES, IN_MEMORY, Flags, RunContext
 from ferryid.vessel import load_profile
 from ferryid.vessel.profile import Profile
 from tests.evidence import stamp
-from tests.real import aauship, causes, esso, groups, instruments, withheld
+from tests.real import aauship, causes, days, esso, groups, instruments, withheld
 from tests.real.places import DATA, REPORTS
 
 ENVIRONMENT = ("wind", "current", "waves", "mooring", "gusts", "shallow_water")
@@ -60,6 +60,8 @@ def write() -> None:
         if kind == "random":
             random = winds_of(study, study.of(kind))
         parts.append(section(study, title, None if kind == "random" else random))
+    print("Sessions", flush=True)
+    parts.append(days.section())
     print("KVLCC2, VTec", flush=True)
     parts += [tank(), pool()]
     print("AAUSHIP", flush=True)

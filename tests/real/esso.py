@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -144,13 +144,20 @@ class Study:
         return np.array([kind == "all" or name.startswith(kind) for name in self.names])
 
 
-def study(kind: str, *, controlled: bool = True) -> Study:
-    """Estimate runs together with the wind withheld and judge their conditions; where `controlled`, the controls' as well."""
+def study(
+    kind: str, *, controlled: bool = True, sessions: Callable[[Sequence[str]], tuple[int, ...]] | None = None
+) -> Study:
+    """Estimate runs together with the wind withheld and judge their conditions; where `controlled`, the controls' as well.
+
+    `sessions` numbers the session of each path; None for what the tool makes of their times.
+    """
     screened = averaged(logs(kind), ESSO, withhold=(WIND,))
     assembled = assemble(screened, ESSO)
     assert assembled is not None
     campaign, place = assembled
     kept = sorted(place, key=lambda path: place[path])
+    if sessions is not None:
+        campaign = replace(campaign, sessions=sessions(kept))
     by_path = {one.path: one for one in screened}
     hidden = [hidden_wind(by_path[path]) for path in kept]
     usable = [wind[member.windows.measurements.usable] for wind, member in zip(hidden, campaign.members, strict=True)]

@@ -73,8 +73,10 @@ VARIANTS_HEAD = """
 The weak form with other treatments of noise in the velocity and of wind that nobody measured, on the first three trials of each
 kind; medians.
 *As it is*: of the velocities measured and steadied by positions those that leave less. *Noise-corrected products*: the products
-of either velocity's regressors with the other's in place of squares, without bounds (Fuller 1987, section 2.4). Orders are no
-instruments in a closed loop: the controller forms them from the same noisy navigation.
+of either velocity's regressors with the other's in place of squares, without bounds (Fuller 1987, section 2.4). *References as
+instruments*: two-stage least squares, whose first stage explains every regressor by those of the motion that guidance asked
+for; the simulator's logs hold it, those of the plant and the recordings at hand do not. Orders are no instruments in a closed
+loop: the controller forms them from the same noisy navigation.
 """
 
 RECORDED_HEAD = f"""
@@ -275,7 +277,8 @@ def variants_section(found: Mapping[str, Sequence[Mapping[str, Found | str]]]) -
             rows.append((kind, [summary([one[name] for one in trials])[place] for name in names]))
         lines += [f"\n*{what}* [{unit}]\n", "| trials | " + " | ".join(names) + " |", "|---|" + "---|" * len(names)]
         spec = ".2f" if place == 5 else ".1f"
-        lines += [f"| {kind} | " + " | ".join(format(value, spec) for value in values) + " |" for kind, values in rows]
+        shown = [(kind, [format(one, spec) if isfinite(one) else "–" for one in values]) for kind, values in rows]
+        lines += [f"| {kind} | " + " | ".join(values) + " |" for kind, values in shown]
     return lines
 
 

@@ -149,6 +149,7 @@ def _simulator(kind: Kind, seed: int, factors: Mapping[str, float], folder: Path
     true = load_profile("milliampere")
     profile = replace(true, hull=perturbed(true.hull, factors))
     calm = load_scenario("twelve-corner-calm")
+    calm = replace(calm, sensors=replace(calm.sensors, reference_rate_hz=calm.sensors.navigation_rate_hz))
     blown = replace(
         calm, wind=Wind(north_mps=WIND_MPS[0], east_mps=WIND_MPS[1], gust_std_mps=GUST_MPS, gust_time_s=8.0)
     )

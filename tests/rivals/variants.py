@@ -1,21 +1,24 @@
 """Ways in which the weak form could treat errors in its regressors and unmeasured winds, measured beside what it does.
 
-Orders are no instruments here: the controller forms them from the same noisy navigation.
+Orders are no instruments here: the controller forms them from the same noisy navigation. The reference that it follows is one,
+where it was recorded: guidance makes it from the path alone.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ferryid.errors import FerryIdError
 from ferryid.identify.estimation import estimate_correction
 from ferryid.identify.fit_data import Coefficients
 from ferryid.identify.log_conditions import Conditions
 from ferryid.identify.weak_data import WeakData, weak_data
-from ferryid.identify.weak_rows import to_force
+from ferryid.identify.weak_rows import WeakRows, average_over_windows, to_force
 from ferryid.identify.window_length import with_best_length
+from ferryid.signals.track import Motion
 from ferryid.types import Floats, no_progress
 from tests.rivals.task import Task, coefficients
 
@@ -50,6 +53,60 @@ def noise_corrected(task: Task, draws: int) -> Coefficients:
     """
     data = with_best_length(weak_data(task.data))
     return _instrumented(data, *(_regressors(_with_velocities(task, steadied=one)) for one in (False, True)))
+
+
+def references_as_instruments(task: Task, draws: int) -> Coefficients:
+    """Return what two-stage least squares find, with the motion that the vessel was to make as instruments.
+
+    In the first stage every regressor is explained by the same functions of the reference's velocities and accelerations, into
+    which no noise of the sensors enters; what they explain takes its place in the weak form, with its whitening, prior, bounds
+    and winds (Söderström and Stoica 1989, section 8.2).
+    """
+    data = _anew(task)
+    windows, terms = data.windows, data.functions.terms
+    asked = []
+    for motion, rows in zip(windows.motions, windows.split.training, strict=True):
+        one = average_over_windows(
+            _reference(motion), rows, data.profile, data.settings.scale, data.functions, windows.training_length_s
+        )
+        asked.append(one.basis(terms, one.by_velocity))
+    Z, X = np.concatenate(asked), np.concatenate([one.regressors(terms) for one in windows.training])
+    Z = np.column_stack([Z / np.maximum(np.linalg.norm(Z, axis=0), 1e-12), np.ones(len(Z)) / np.sqrt(len(Z))])
+    explained = Z @ np.linalg.lstsq(Z, X, rcond=1e-9)[0]
+    ends = np.cumsum([len(one) for one in windows.training])[:-1]
+    windows.__dict__["training"] = tuple(
+        _Explained(**vars(one), explained=part)
+        for one, part in zip(windows.training, np.split(explained, ends), strict=True)
+    )
+    return _estimate(data, draws)
+
+
+@dataclass(frozen=True, eq=False)
+class _Explained(WeakRows):
+    """Windows with what instruments explain of the regressors, shape (J, K), in their place."""
+
+    explained: Floats
+
+    def regressors(self, terms: tuple[str, ...]) -> Floats:
+        """Return them."""
+        return self.explained
+
+
+def _reference(motion: Motion) -> Motion:
+    """Return the motion that a log's vessel was to make."""
+    if motion.eta_d is None:
+        raise FerryIdError(f"{motion.log}: no reference was recorded. Fix: leave this variant out")
+    known = np.isfinite(motion.eta_d).all(axis=1)
+    if not known.any():
+        raise FerryIdError(f"{motion.log}: no reference was recorded. Fix: leave this variant out")
+    # The first sample comes after the first row of the grid.
+    whole = motion.eta_d[known].copy()
+    whole[:, 2] = np.unwrap(whole[:, 2])
+    x, y, psi = (np.interp(motion.t, motion.t[known], column) for column in whole.T)
+    north, east = np.gradient(x, motion.t), np.gradient(y, motion.t)
+    cosine, sine = np.cos(psi), np.sin(psi)
+    nu = np.column_stack([cosine * north + sine * east, cosine * east - sine * north, np.gradient(psi, motion.t)])
+    return replace(motion, nu=nu, eta=np.column_stack([x, y, psi]))
 
 
 def _anew(task: Task) -> WeakData:
@@ -93,6 +150,7 @@ VARIANTS: Mapping[str, Callable[[Task, int], Coefficients]] = {
     "velocities as measured": measured_velocity,
     "velocities steadied by positions": steadied_velocity,
     "noise-corrected products": noise_corrected,
+    "references as instruments": references_as_instruments,
     "no winds of single logs": without_winds,
 }
 """Every variant by the name that the page gives it."""

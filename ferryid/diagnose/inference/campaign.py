@@ -14,6 +14,7 @@ from ferryid.diagnose.inference.campaign_logs import Member
 from ferryid.diagnose.inference.campaign_model import INDUCED, Campaign, HullPrior, induced, induced_spread
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.prior import correlation_root, prior_force_model
+from ferryid.diagnose.inference.sessions import sessions
 from ferryid.diagnose.inference.stages import AveragedLog
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
@@ -104,7 +105,8 @@ def assemble(
     mean = np.concatenate([members[0].plain.hull, np.zeros(len(INDUCED))])
     spread = np.append(np.max(spreads, axis=0), size)
     prior = HullPrior(mean, spread, known, None if model is None else correlation_root(model, spread))
-    return Campaign(tuple(members), prior), place
+    by_path = {one.path: one for one in reversed(logs)}
+    return Campaign(tuple(members), prior, sessions=sessions([by_path[path] for path in place])), place
 
 
 def _conditions_of_logs(members: Sequence[Member], reference: Sequence[bool]) -> list[Member]:

@@ -80,7 +80,8 @@ def estimate_courses(fit: CampaignFit, k: int, turbulence: Turbulence) -> tuple[
     rows = [j for j, (of, _) in enumerate(campaign.own) if of == k]
     speed = float(np.mean([np.hypot(*fit.condition(i, k)[0]) for i in places]))
     logs = over(lambda i: _eliminated(fit, i, rows, turbulence, speed), places)
-    whole = np.column_stack([np.eye(campaign.g), fit.common])
+    precise = np.sqrt(campaign.common_precision(fit.spreads))
+    whole = np.column_stack([np.diag(precise), precise * fit.common])
     R = _triangular([whole, *(one.left for one in logs)])
     step = -solve_triangular(R[: campaign.g, : campaign.g], R[: campaign.g, -1])
     root = solve_triangular(R[: campaign.g, : campaign.g], np.eye(campaign.g))
@@ -110,14 +111,15 @@ def _eliminated(fit: CampaignFit, i: int, rows: list[int], turbulence: Turbulenc
     departures = fit.noise.white(i, windows.along_vessel(_changes(fit, i, rows, knots)), windows.runs)
     J = np.concatenate([fit.parts[i].slopes, departures], axis=2)
     J = J.reshape(-1, J.shape[2])
-    steady = np.sqrt(campaign.own_precision(fit.spreads))
     process = np.kron(np.linalg.cholesky(knots.precision(time_constant_s)).T, np.diag(size / std))
     # Orthogonal elimination: on all but noiseless logs, normal equations of so many knots lose their digits.
     own = J.shape[1] - g
     measured = np.column_stack([J[:, g:], J[:, :g], fit.parts[i].gaps.ravel()])
     believed = np.zeros((own, J.shape[1] + 1))
-    believed[:, :own] = block_diag(np.diag(steady), process)
-    believed[: campaign.l, -1] = steady * fit.own[i]
+    steady = fit.own_belief(i)
+    believed[:, :own] = block_diag(steady[:, g:], process)
+    believed[: campaign.l, own:-1] = steady[:, :g]
+    believed[: campaign.l, -1] = steady @ np.concatenate([fit.common, fit.own[i]])
     R = _triangular([measured, believed])
     root = solve_triangular(R[:own, :own], np.eye(own))
     return _Log(knots, R[own:, own:], root @ root.T, -root @ R[:own, -1], root @ R[:own, own:-1])

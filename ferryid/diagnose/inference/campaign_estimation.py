@@ -7,6 +7,7 @@ wind and current are not. So everything is estimated at once, by Gauss-Newton st
 - the hull's coefficients, with the drag of drift and turning (surge forces with v r and v v) that a hull which lifts pays;
 - what is the vessel's beside them, such as factors on its wind load;
 - conditions of every log, as random effects about a mean of all: logs of one campaign blow in one weather;
+- how those of each session depart from that mean: logs that are near in time are more alike;
 - a steady acceleration of every log along the vessel's axes, another random effect: what trim, thrust curves and formulas are
   off in the manoeuvres of one log is in none of the others, and must not become its wind.
 
@@ -17,7 +18,7 @@ on which forces act, by coloured noise that is of one colour in all logs and lou
 References
 ----------
 Fossen (2021), section 6.5, for cross-flow drag and lift; Laird and Ware (1982), Random-effects models for longitudinal data;
-Gelman et al. (2013), Bayesian Data Analysis, chapter 5, for parameters that groups of data share.
+Gelman et al. (2013), Bayesian Data Analysis, chapter 5, for parameters that groups of data share, and groups of groups.
 """
 
 from __future__ import annotations
@@ -117,8 +118,11 @@ class CampaignFit:
         A log's gradient at the common estimate has its normal matrix as covariance if nothing but noise sets it apart.
         """
         apart, expected, logs = 0.0, 0.0, len(self.parts)
-        inverses = np.linalg.inv(self.normal.matrices + np.eye(self.campaign.g))
-        for H, slope, inverse in zip(self.normal.matrices, self.normal.slopes, inverses, strict=True):
+        # A session's departures are not what all logs share.
+        shared = self.campaign.means.stop
+        matrices, slopes = self.normal.matrices[:, :shared, :shared], self.normal.slopes[:, :shared]
+        inverses = np.linalg.inv(matrices + np.eye(shared))
+        for H, slope, inverse in zip(matrices, slopes, inverses, strict=True):
             apart += float(slope @ inverse @ slope)
             expected += float(np.sum(H * inverse.T))
         return apart / max(expected * (1.0 - 1.0 / logs), 1e-12) if logs > 1 else 1.0
@@ -131,7 +135,7 @@ class CampaignFit:
         without
             The log that has no part in it; None for what all logs say.
         """
-        prior, h = np.eye(self.campaign.g), len(self.campaign.hull.mean)
+        prior, h = np.diag(self.normal.prior), len(self.campaign.hull.mean)
         A, z = prior + np.sum(self.normal.matrices, axis=0), self.common
         if without is not None:
             # At the optimum all gradients and the prior's cancel, so that without one log its own is what is missing.
@@ -154,9 +158,18 @@ class CampaignFit:
         neutral = np.array([one.neutral for one in parameters])
         pick = np.zeros((len(rows), campaign.g + campaign.l))
         for row, j in enumerate(rows):
-            pick[row, campaign.g - len(campaign.own) + j] = pick[row, campaign.g + j] = size[row]
+            pick[row, campaign.means.start + j] = pick[row, campaign.g + j] = size[row]
         factor = INFERENCE.posterior_factor**2 * max(1.0, self.disagreement)
         return neutral + size * (mean + self.own[i, rows]), factor * pick @ self.covariance(i) @ pick.T
+
+    def own_belief(self, i: int) -> Floats:
+        """Return what is believed of the vector of a log as equations, shape (l, g + l)."""
+        return self.campaign.own_belief(i, self.spreads)
+
+    def own_gradient(self, i: int) -> Floats:
+        """Return the slope of half their squared errors by both vectors, shape (g + l,)."""
+        equations = self.own_belief(i)
+        return np.asarray(equations.T @ (equations @ np.concatenate([self.common, self.own[i]])))
 
     def force_model(self, i: int) -> ForceModel:
         """Return a log's force model at the estimate."""
@@ -171,21 +184,19 @@ class CampaignFit:
     @property
     def cost(self) -> float:
         """Squares of the whitened gaps and of what is estimated in units of its belief: twice the negative log posterior."""
-        precision = self.campaign.own_precision(self.spreads)
-        squares = [
-            float(np.sum(part.gaps**2) + own @ (precision * own))
-            for own, part in zip(self.own, self.parts, strict=True)
-        ]
-        return float(self.common @ self.common) + sum(squares)
+        squares = [float(np.sum(part.gaps**2)) for part in self.parts]
+        return believed_squares(self.campaign, self.spreads, self.common, self.own) + sum(squares)
 
     @property
     def evidence(self) -> float:
         """Logarithm of the evidence (Laplace), but for what only the noise decides."""
         precision = self.campaign.own_precision(self.spreads)
         logarithm = float(np.sum(np.linalg.slogdet(self.normal.own)[1] - np.sum(np.log(precision))))
-        A = np.eye(self.campaign.g) + np.sum(self.normal.matrices, axis=0)
+        prior = self.normal.prior
+        logarithm += float(np.linalg.slogdet(np.diag(prior) + np.sum(self.normal.matrices, axis=0))[1])
+        logarithm -= float(np.sum(np.log(prior)))
         rarity = sum(one.log_alternatives for one in (*self.campaign.conditions, *self.campaign.properties))
-        return -0.5 * self.cost - 0.5 * logarithm - 0.5 * float(np.linalg.slogdet(A)[1]) - rarity
+        return -0.5 * self.cost - 0.5 * logarithm - rarity
 
 
 @dataclass(frozen=True)
@@ -200,6 +211,8 @@ class _Eliminated:
         By log: its own normal matrix, shape (L, l, l), and how its own vector follows the common one, shape (L, l, g).
     own_slopes
         By log, shape (L, l).
+    prior
+        What is believed of the common vector: inverse variances about zero, shape (g,).
     """
 
     matrices: Floats
@@ -207,24 +220,27 @@ class _Eliminated:
     own: Floats
     back: Floats
     own_slopes: Floats
+    prior: Floats
 
     @classmethod
     def of(cls, made: CampaignFit) -> _Eliminated:
-        g, precision = made.campaign.g, made.campaign.own_precision(made.spreads)
+        g = made.campaign.g
         # Logs are of many lengths, their normal equations of one size.
         flat = [part.slopes.reshape(-1, part.slopes.shape[2]) for part in made.parts]
-        N = np.stack([J.T @ J for J in flat])
+        believed = np.stack([made.own_belief(i) for i in range(len(flat))])
+        N = np.stack([J.T @ J for J in flat]) + np.swapaxes(believed, 1, 2) @ believed
         b = np.stack([J.T @ part.gaps.ravel() for J, part in zip(flat, made.parts, strict=True)])
-        Q, gradient = N[:, g:, g:] + np.diag(precision), b[:, g:] + precision * made.own
+        b += np.stack([made.own_gradient(i) for i in range(len(flat))])
+        Q, gradient = N[:, g:, g:], b[:, g:]
         back = np.asarray(np.linalg.solve(Q, N[:, g:, :g]), dtype=np.float64)
         matrices = N[:, :g, :g] - N[:, :g, g:] @ back
         slopes = b[:, :g] - np.einsum("ilg,il->ig", back, gradient)
-        return cls(matrices, slopes, Q, back, gradient)
+        return cls(matrices, slopes, Q, back, gradient, made.campaign.common_precision(made.spreads))
 
     @cached_property
     def common_covariance(self) -> Floats:
         """Posterior covariance of the common vector, shape (g, g)."""
-        A = np.eye(self.matrices.shape[1]) + np.sum(self.matrices, axis=0)
+        A = np.diag(self.prior) + np.sum(self.matrices, axis=0)
         return np.asarray(np.linalg.inv(A), dtype=np.float64)
 
     @cached_property
@@ -241,9 +257,18 @@ class _Eliminated:
 
     def step(self, common: Floats) -> tuple[Floats, Floats]:
         """Return the Gauss-Newton step of the common vector and of each log's own, shapes (g,) and (L, l)."""
-        A = np.eye(len(common)) + np.sum(self.matrices, axis=0)
-        step = -np.linalg.solve(A, common + np.sum(self.slopes, axis=0))
+        A = np.diag(self.prior) + np.sum(self.matrices, axis=0)
+        step = -np.linalg.solve(A, self.prior * common + np.sum(self.slopes, axis=0))
         return step, -np.linalg.solve(self.own, self.own_slopes[:, :, None])[:, :, 0] - self.back @ step
+
+
+def believed_squares(campaign: Campaign, spreads: Spreads, common: Floats, own: Floats) -> float:
+    """Return the squares of both vectors in units of what is believed of them, those of all logs, shape (L, l)."""
+    away = own.copy()
+    for i, session in enumerate(campaign.sessions if campaign.session_count else ()):
+        away[i, : len(campaign.own)] -= common[campaign.session_rows(session)]
+    shared = campaign.common_precision(spreads) @ common**2
+    return float(shared + np.sum(away**2 @ campaign.own_precision(spreads)))
 
 
 def estimate_campaign(
@@ -294,7 +319,7 @@ def _settled(
         at, gained = _step(made, at)
         change = 0.0
         if not known_spreads:
-            spreads, change = _spreads(made, at.own)
+            spreads, change = _spreads(made, at)
         made = _fit(campaign, at, noise or _noise(campaign, at.gaps), spreads)
         if change < SETTLED and gained < CONVERGED_GAIN:
             break
@@ -354,22 +379,25 @@ def _better(made: CampaignFit, i: int, tried: Sequence[_Tried]) -> Floats | None
     """Return the own vector of a log with conditions that explain clearly more than its present ones; None without such."""
     campaign, part, g = made.campaign, made.parts[i], made.campaign.g
     runs = campaign.members[i].windows.runs
-    own_precision = campaign.own_precision(made.spreads)
+    believed = made.own_belief(i)
     J, w = part.slopes.reshape(-1, part.slopes.shape[2]), part.gaps.ravel()
     # The other logs' say in what is common; at the optimum their slopes are those of this log with the other sign.
-    others = np.eye(g) + np.sum(made.normal.matrices, axis=0) - made.normal.matrices[i]
-    H = J.T @ J
+    others = np.diag(made.normal.prior) + np.sum(made.normal.matrices, axis=0) - made.normal.matrices[i]
+    H = J.T @ J + believed.T @ believed
     H[:g, :g] += others
-    H[g:, g:] += np.diag(own_precision)
-    now = float(w @ w + made.own[i] ** 2 @ own_precision)
+    here = np.concatenate([made.common, made.own[i]])
+    now = float(w @ w + np.sum((believed @ here) ** 2))
     best, least = None, now - 2.0 * CLEARLY_BETTER
     for one in tried:
         kept = np.ones(len(H), dtype=bool)
-        kept[[g - len(campaign.own) + j for j in one.rows]] = kept[[g + j for j in one.rows]] = False
+        kept[[campaign.means.start + j for j in one.rows]] = kept[[g + j for j in one.rows]] = False
+        # A session stays where it is while one of its logs is moved.
+        kept[campaign.means.stop : g] = False
         factor = cho_factor(H[np.ix_(kept, kept)])
         left = one.white(made.noise, i, runs)
         slope = J[:, kept].T @ (left - w[:, None])
-        cost = np.sum(left**2, axis=0) + one.own[:, i] ** 2 @ own_precision
+        away = np.hstack([np.tile(made.common, (len(one.own), 1)), one.own[:, i]]) @ believed.T
+        cost = np.sum(left**2, axis=0) + np.sum(away**2, axis=1)
         cost -= np.sum(slope * cho_solve(factor, slope), axis=0)
         nearest = int(np.argmin(cost))
         if cost[nearest] < least:
@@ -415,13 +443,12 @@ def _fit(campaign: Campaign, at: _Point, noise: CampaignNoise, spreads: Spreads)
 def _step(made: CampaignFit, at: _Point) -> tuple[_Point, float]:
     """Return where a Gauss-Newton step leads, and how much it gains."""
     campaign, noise = made.campaign, made.noise
-    precision = campaign.own_precision(made.spreads)
 
     def cost(common: Floats, own: Floats, gaps: Sequence[Floats]) -> float:
         squares = [
             float(np.sum(noise.white(i, one, campaign.members[i].windows.runs) ** 2)) for i, one in enumerate(gaps)
         ]
-        return float(common @ common) + float(np.sum(own**2 * precision)) + sum(squares)
+        return believed_squares(campaign, made.spreads, common, own) + sum(squares)
 
     now = cost(made.common, made.own, at.gaps)
     step, own_step = made.normal.step(made.common)
@@ -446,17 +473,18 @@ def _first(campaign: Campaign, bare: CampaignFit | None) -> tuple[Spreads, _Poin
     common, own = np.zeros(campaign.g), np.zeros((len(campaign.members), campaign.l))
     # Some properties, such as a dead band, have no slope where they do not act.
     begun = [0.0 if one.start is None else (one.start - one.neutral) / one.size for one in campaign.lasting]
-    common[campaign.g - len(campaign.own) - len(begun) : campaign.g - len(campaign.own)] = begun
+    common[campaign.means.start - len(begun) : campaign.means.start] = begun
     gaps = np.vstack(campaign.gaps(common, own))
     steady = STEADY_SHARE * np.sqrt(np.mean(gaps**2, axis=0))
-    spreads = Spreads((1.0,) * len(campaign.conditions), np.maximum(steady, 1e-12))
+    every = (1.0,) * len(campaign.conditions)
+    spreads = Spreads(every, np.maximum(steady, 1e-12), every if campaign.session_count else ())
     if not campaign.own:
         return spreads, _point(campaign, common, own)
     made = estimate_campaign(bare_campaign(campaign)) if bare is None else bare
     h = len(campaign.hull.mean)
     common[:h] = made.common[:h]
     own[:, -3:] = made.own
-    spreads = Spreads(spreads.conditions, made.spreads.steady)
+    spreads = replace(spreads, steady=made.spreads.steady)
     starts = _started(campaign, made, common, own)
     common[campaign.means] = starts.mean(axis=0)
     own[:, : len(campaign.own)] = starts - starts.mean(axis=0)
@@ -508,20 +536,43 @@ def _noise(campaign: Campaign, gaps: Sequence[Floats]) -> CampaignNoise:
     return noise
 
 
-def _spreads(made: CampaignFit, now: Floats) -> tuple[Spreads, float]:
-    """Return the spreads that the vectors of the logs speak for, shape (L, l), and their largest change.
+def _spreads(made: CampaignFit, at: _Point) -> tuple[Spreads, float]:
+    """Return the spreads that both vectors speak for, and their largest change.
 
     It is a step of expectation and maximisation, with the covariances of an estimate near by.
     """
     campaign, before = made.campaign, made.spreads
-    count = len(campaign.own)
-    second = now**2 + np.diagonal(made.normal.own_covariances, axis1=1, axis2=2)
-    conditions = []
+    count, m = len(campaign.own), len(campaign.conditions)
+    second, between = _second_moments(made, at)
+    conditions, sessions = [], []
     for k, condition in enumerate(campaign.conditions):
         rows = _rows(campaign, k)
         have = [i for i, one in enumerate(campaign.members) if condition.key in {each.key for each in one.conditions}]
         conditions.append(float(np.sqrt(np.mean(second[np.ix_(have, rows)]))))
-    old = np.array([*before.conditions, *before.steady])
-    ratio = np.array([*conditions, *np.sqrt(np.mean(second[:, count:], axis=0))]) / old
+        if campaign.session_count:
+            seen = sorted({campaign.sessions[i] for i in have})
+            sessions.append(float(np.sqrt(np.mean(between[np.ix_(seen, rows)]))))
+    old = np.array([*before.conditions, *before.sessions, *before.steady])
+    ratio = np.array([*conditions, *sessions, *np.sqrt(np.mean(second[:, count:], axis=0))]) / old
     new = old * ratio**RELAXATION
-    return Spreads(tuple(new[: len(conditions)].tolist()), new[len(conditions) :]), float(np.abs(ratio - 1.0).max())
+    found = Spreads(tuple(new[:m].tolist()), new[m + len(sessions) :], tuple(new[m : m + len(sessions)].tolist()))
+    return found, float(np.abs(ratio - 1.0).max())
+
+
+def _second_moments(made: CampaignFit, at: _Point) -> tuple[Floats, Floats]:
+    """Return expected squares of the logs' own vectors about those of their sessions, shape (L, l), and of these, (S, own)."""
+    campaign, normal = made.campaign, made.normal
+    variances = np.diagonal(normal.own_covariances, axis1=1, axis2=2)
+    if not campaign.session_count:
+        return at.own**2 + variances, np.zeros((0, len(campaign.own)))
+    count, away, second = len(campaign.own), at.own.copy(), variances.copy()
+    C, between = normal.common_covariance, []
+    for session in range(campaign.session_count):
+        rows = campaign.session_rows(session)
+        variance = np.diag(C[rows, rows])
+        between.append(at.common[rows] ** 2 + variance)
+        for i in np.flatnonzero(np.array(campaign.sessions) == session).tolist():
+            away[i, :count] -= at.common[rows]
+            across = -normal.back[i, :count] @ C[:, rows]
+            second[i, :count] += variance - 2.0 * np.diag(across)
+    return away**2 + second, np.stack(between)

@@ -56,24 +56,31 @@ class HullPrior:
 
 @dataclass(frozen=True)
 class Spreads:
-    """Standard deviations between logs: of each condition, in sizes, and of the steady accelerations, shape (3,)."""
+    """Standard deviations between logs: of each condition, in sizes, and of the steady accelerations, shape (3,).
+
+    Where logs fall into sessions, `conditions` are those between the logs of one, and `sessions` those between them.
+    """
 
     conditions: tuple[float, ...]
     steady: Floats
+    sessions: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
 class Campaign:
     """Logs with the belief about their hull: what is estimated together.
 
-    The vector of all logs, shape (g,), holds the hull in spreads, what conditions share, properties, and the conditions'
-    means, in sizes; that of a log, shape (l,), its conditions' departures from these means, in sizes, and its steady
-    acceleration.
+    The vector of all logs, shape (g,), holds the hull in spreads, what conditions share, properties, the conditions' means, in
+    sizes, and by how much those of each session depart from them; that of a log, shape (l,), its conditions' departures from
+    the means of all logs, in sizes, and its steady acceleration. `sessions` numbers the session of each log; logs of one
+    session are near in time, so that their conditions are more alike than those of different ones. Empty where times are not
+    known.
     """
 
     members: tuple[Member, ...]
     hull: HullPrior
     properties: tuple[Candidate, ...] = ()
+    sessions: tuple[int, ...] = ()
 
     @cached_property
     def conditions(self) -> tuple[Candidate, ...]:
@@ -109,7 +116,13 @@ class Campaign:
     @property
     def g(self) -> int:
         """Length of the vector of all logs."""
-        return len(self.hull.mean) + len(self.shared) + len(self.lasting) + len(self.own)
+        return int(self.means.stop) + self.session_count * len(self.own)
+
+    @cached_property
+    def session_count(self) -> int:
+        """How many sessions there are; 0 where all logs are of one, or each is of its own: a session says nothing then."""
+        count = len(set(self.sessions))
+        return count if 1 < count < len(self.sessions) else 0
 
     @property
     def l(self) -> int:  # noqa: E743
@@ -119,7 +132,8 @@ class Campaign:
     @property
     def means(self) -> slice:
         """Where the conditions' means stand in the vector of all logs."""
-        return slice(self.g - len(self.own), self.g)
+        first = len(self.hull.mean) + len(self.shared) + len(self.lasting)
+        return slice(first, first + len(self.own))
 
     def values(self, common: Floats, own: Floats) -> tuple[list[Floats], list[Floats]]:
         """Return the parameters of the conditions of a log and of the properties, in their units and within their limits.
@@ -127,7 +141,7 @@ class Campaign:
         Of several logs, with `own` of shape (L, l), those of the conditions have a row for each.
         """
         means = common[self.means] + own[..., : len(self.own)]
-        fixed = common[len(self.hull.mean) : self.g - len(self.own)]
+        fixed = common[len(self.hull.mean) : self.means.start]
         every = np.concatenate([np.broadcast_to(fixed, (*means.shape[:-1], len(fixed))), means], axis=-1)
         first, limits, cuts = self._layout
         neutral, size, low, high = limits
@@ -257,17 +271,40 @@ class Campaign:
         """Return gaps and derivatives, those by the hull left open."""
         gaps, h, m = self._gaps(stack, common, own), len(self.hull.mean), len(self.own)
         slopes = np.zeros((*gaps.shape, self.g + self.l))
-        for k in range(h, self.g - m):
+        for k in range(h, self.means.start):
             slopes[:, :, k] = (self._gaps(stack, _moved(common, k), own) - gaps) / DIFFERENCE_STEP
         for k in range(m):
             # A wind near none has no slope to one side of what it has to the other: both count.
             ahead, astern = (self._gaps(stack, common, _moved(own, k, sign)) for sign in (1.0, -1.0))
-            slopes[:, :, self.g - m + k] = slopes[:, :, self.g + k] = (ahead - astern) / (2.0 * DIFFERENCE_STEP)
+            slopes[:, :, self.means.start + k] = slopes[:, :, self.g + k] = (ahead - astern) / (2.0 * DIFFERENCE_STEP)
         slopes[:, :, -3:] = np.eye(3)
         return gaps, slopes
 
+    def session_rows(self, session: int) -> slice:
+        """Return where the departures of a session stand in the vector of all logs."""
+        first = self.means.stop + session * len(self.own)
+        return slice(first, first + len(self.own))
+
+    def common_precision(self, spreads: Spreads) -> Floats:
+        """Return what is believed of the vector of all logs: inverse variances about zero, shape (g,)."""
+        every = [spreads.sessions[k] for _ in range(self.session_count) for k, _ in self.own]
+        return np.concatenate([np.ones(self.means.stop), np.array(every) ** -2.0])
+
+    def own_belief(self, i: int, spreads: Spreads) -> Floats:
+        """Return what is believed of the vector of a log as equations, shape (l, g + l).
+
+        Their products with both vectors are errors of unit variance: a log's departures are near those of its session.
+        """
+        precise = self.own_precision(spreads) ** 0.5
+        equations = np.hstack([np.zeros((self.l, self.g)), np.diag(precise)])
+        if self.session_count:
+            of_session = range(*self.session_rows(self.sessions[i]).indices(self.g))
+            for row, column in enumerate(of_session):
+                equations[row, column] = -precise[row]
+        return equations
+
     def own_precision(self, spreads: Spreads) -> Floats:
-        """Return what is believed of the vector of a log: inverse variances, shape (l,)."""
+        """Return inverse variances of the vector of a log about where its session is, shape (l,)."""
         mine = [spreads.conditions[k] for k, _ in self.own]
         return np.concatenate([mine, spreads.steady]) ** -2.0
 

@@ -147,23 +147,25 @@ def _linearised(made: CampaignFit, candidate: Candidate, share: float) -> Start:
     """
     begun = with_property(made, candidate, share)
     g, q, normal = made.campaign.g, len(candidate.parameters), made.normal
-    place = g - len(made.campaign.own)
+    place = made.campaign.means.start
     first = begun.common[place : place + q]
-    A, b = np.eye(g + q), np.concatenate([made.common, first])
+    A, b = np.diag(np.append(normal.prior, np.ones(q))), np.concatenate([normal.prior * made.common, first])
     gained = -0.5 * float(first @ first)
     lines = _gaps_and_slopes(begun, range(place, place + q))
     for i, (part, both) in enumerate(zip(made.parts, lines, strict=True)):
         white = made.noise.white(i, both, made.campaign.members[i].windows.runs).reshape(-1, 1 + q)
         J, was, w = part.slopes.reshape(-1, part.slopes.shape[2]), part.gaps.ravel(), white[:, 0]
         K = np.hstack([J[:, :g], white[:, 1:]])
-        across, before = J[:, g:].T @ K, normal.own_slopes[i]
+        believed = np.hstack([made.own_belief(i)[:, :g], np.zeros((made.campaign.l, q))])
+        across, before = J[:, g:].T @ K + made.own_belief(i)[:, g:].T @ believed, normal.own_slopes[i]
         own = before + J[:, g:].T @ (w - was)
         factor = cho_factor(normal.own[i])
-        A += K.T @ K - across.T @ cho_solve(factor, across)
+        A += K.T @ K + believed.T @ believed - across.T @ cho_solve(factor, across)
         b += K.T @ w - across.T @ cho_solve(factor, own)
+        b[:g] += made.own_gradient(i)[:g]
         gained += 0.5 * float(was @ was - w @ w)
         gained += 0.5 * float(own @ cho_solve(factor, own) - before @ cho_solve(factor, before))
-    settled, of_others = made.common + np.sum(normal.slopes, axis=0), A[:g, :g]
+    settled, of_others = normal.prior * made.common + np.sum(normal.slopes, axis=0), A[:g, :g]
     gained += 0.5 * float(b @ np.linalg.solve(A, b) - settled @ np.linalg.solve(of_others, settled))
     gained -= 0.5 * float(np.linalg.slogdet(A)[1] - np.linalg.slogdet(of_others)[1]) + candidate.log_alternatives
     return Start(candidate, begun, gained)
@@ -172,7 +174,7 @@ def _linearised(made: CampaignFit, candidate: Candidate, share: float) -> Start:
 def with_property(made: CampaignFit, candidate: Candidate, share: float = 1.0) -> CampaignFit:
     """Return an estimate with a property more: at a share of the way from where it does not act to its start."""
     campaign = replace(made.campaign, properties=(*made.campaign.properties, candidate))
-    place = made.campaign.g - len(made.campaign.own)
+    place = made.campaign.means.start
     start = [
         share * ((one.neutral if one.start is None else one.start) - one.neutral) / one.size
         for one in candidate.parameters

@@ -273,7 +273,7 @@ def _in_sizes(candidate: Candidate, values: Floats) -> Floats:
 def _slopes(made: CampaignFit, candidate: Candidate, z: Floats) -> list[Floats]:
     """Return derivatives of the gaps of every log by a property as if it acted there, whitened, shape (J, 3, p) each."""
     everywhere = with_property(made, replace(candidate, group=""))
-    first = made.campaign.g - len(made.campaign.own)
+    first = made.campaign.means.start
     common = everywhere.common.copy()
     common[first : first + len(z)] = z
 
@@ -303,10 +303,13 @@ def _gram(made: CampaignFit, i: int, columns: Floats, acts: bool | None = None) 
     J, w = part.slopes.reshape(-1, part.slopes.shape[2]), part.gaps.ravel()
     D = columns.reshape(-1, columns.shape[2])
     K = np.hstack([J[:, :g], *(() if acts is None else (acts * D,)), D])
-    across = K.T @ J[:, g:]
+    believed = np.hstack([made.own_belief(i)[:, :g], np.zeros((made.campaign.l, K.shape[1] - g))])
+    across = K.T @ J[:, g:] + believed.T @ made.own_belief(i)[:, g:]
     factor = cho_factor(made.normal.own[i])
-    matrix = K.T @ K - across @ cho_solve(factor, across.T)
-    return _Gram(matrix, K.T @ w - across @ cho_solve(factor, made.normal.own_slopes[i]))
+    matrix = K.T @ K + believed.T @ believed - across @ cho_solve(factor, across.T)
+    slope = K.T @ w - across @ cho_solve(factor, made.normal.own_slopes[i])
+    slope[:g] += made.own_gradient(i)[:g]
+    return _Gram(matrix, slope)
 
 
 @dataclass(frozen=True)
@@ -357,10 +360,10 @@ def _averaged(made: CampaignFit, grams: Sequence[_Gram], p: int, beside: bool, r
         rare = exp(-INFERENCE.prior_odds)
         priors = {0.0: 1.0 - rare, **dict.fromkeys(SCATTERS, rare / len(SCATTERS))}
     logs, shifts, variances = [], [], []
-    centre = np.zeros(len(used))
-    centre[:g] = made.common
+    centre, prior = np.zeros(len(used)), np.ones(len(used))
+    centre[:g], prior[:g] = made.normal.prior * made.common, made.normal.prior
     for scatter in priors:
-        A, r, logarithm = np.eye(len(used)), centre.copy(), 0.0
+        A, r, logarithm = np.diag(prior), centre.copy(), 0.0
         for one in grams:
             H, h = one.matrix[np.ix_(used, used)], one.slope[used]
             if scatter > 0.0:

@@ -137,6 +137,12 @@ class InferenceThresholds:
         "shorter logs have no say in a campaign",
         "derived: of two windows one shows what changed since the other; 16 before, when a log alone started its noise",
     )
+    session_gap_h: float = threshold(
+        3.0,
+        "h",
+        "logs that begin later than this after the end of those before are of another session, with weather of its own",
+        "convention: a wind keeps its strength and direction for some hours, and a crew goes out in the morning or after noon",
+    )
     fewest_steps: int = threshold(
         10, "steps", "shorter stretches are left out", "convention: half a window, from which no noise is estimated"
     )

@@ -17,7 +17,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ferryid.diagnose.inference.campaign_estimation import CampaignFit
+from ferryid.diagnose.inference.campaign_estimation import CampaignFit, believed_squares
 from ferryid.diagnose.inference.campaign_logs import Member
 from ferryid.diagnose.inference.campaign_model import Campaign
 from ferryid.diagnose.inference.candidate import Candidate, OtherHeading
@@ -144,7 +144,7 @@ def _left(fit: CampaignFit, signals: Sequence[Floats]) -> float:
     parts = tuple(replace(part, gaps=one) for part, one in zip(fit.parts, signals, strict=True))
     begun = replace(fit, common=np.zeros_like(fit.common), own=np.zeros_like(fit.own), parts=parts)
     step, own = begun.normal.step(begun.common)
-    left = float(step @ step) + float(np.sum(own**2 * fit.campaign.own_precision(fit.spreads)))
+    left = believed_squares(fit.campaign, fit.spreads, step, own)
     for part, mine in zip(parts, own, strict=True):
         left += float(np.sum((part.gaps + part.slopes @ np.concatenate([step, mine])) ** 2))
     return left

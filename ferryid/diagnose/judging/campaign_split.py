@@ -159,13 +159,15 @@ class _Logs:
         A, slope = self._belief(which)
         normal, (inverses, known) = self.made.normal, self._alone
         gradients = normal.slopes[which] + normal.matrices[which] @ np.linalg.solve(A, slope)
+        gradients = gradients[:, : self.made.campaign.means.stop]
         apart = float(np.einsum("ig,igk,ik->", gradients, inverses[which], gradients))
         return max(1.0, apart / max(float(known[which].sum()) * (1.0 - 1.0 / len(which)), 1e-12))
 
     @cached_property
     def _alone(self) -> tuple[Floats, Floats]:
-        """What each log alone makes of the common vector: covariances, shape (L, g, g), and how much it tells, shape (L,)."""
-        matrices = self.made.normal.matrices
+        """What each log alone makes of what all share: covariances, shape (L, k, k), and how much it tells, shape (L,)."""
+        shared = self.made.campaign.means.stop
+        matrices = self.made.normal.matrices[:, :shared, :shared]
         inverses = np.asarray(np.linalg.inv(matrices + np.eye(matrices.shape[1])), dtype=np.float64)
         return inverses, np.einsum("igk,ikg->i", matrices, inverses)
 
@@ -173,19 +175,18 @@ class _Logs:
         """Return what some logs say of the step from the common estimate: its precision, and that times its mean."""
         normal, common = self.made.normal, self.made.common
         H, b = normal.matrices[which].sum(axis=0) / factor, normal.slopes[which].sum(axis=0) / factor
-        return np.eye(len(common)) + H, -(common + b)
+        return np.diag(normal.prior) + H, -(normal.prior * common + b)
 
     def _held_out(self, i: int, others: Ints, factor: float) -> tuple[Floats, Floats]:
         """Return the squares of a log's held-out blocks, whitened, and its errors, if others bring the hull."""
         made, part = self.made, self.made.parts[i]
         P, b = self._belief(others, factor)
-        precision = made.campaign.own_precision(made.spreads)
+        believed = made.own_belief(i)
         g, width = len(b), part.slopes.shape[2]
         J, w = part.slopes.reshape(-1, width), part.gaps.ravel()
-        N = J.T @ J
+        N = J.T @ J + believed.T @ believed
         N[:g, :g] += P
-        N[g:, g:] += np.diag(precision)
-        right = np.concatenate([b, -precision * made.own[i]]) - J.T @ w
+        right = np.append(b, np.zeros(width - g)) - made.own_gradient(i) - J.T @ w
         errors, slopes = self.linear[i]
         errors, squares = errors.copy(), []
         for block, near in held_out_blocks(made.campaign.members[i].windows):

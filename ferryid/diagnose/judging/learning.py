@@ -55,6 +55,8 @@ class Learned:
         none.
     with_hints
         True where effects of whose name the diagnosis is in doubt are in the model, as predictions with them are better.
+    fit_alone
+        True where the model of ``ferryid fit`` is stored in the place of that of the diagnosis, as it predicts better.
     """
 
     accepted: bool
@@ -63,6 +65,7 @@ class Learned:
     ratio: Mapping[str, float] | None = None
     over_fit: Mapping[str, float] | None = None
     with_hints: bool = False
+    fit_alone: bool = False
 
     def to_json(self) -> dict[str, object]:
         """Return it as plain values."""
@@ -73,6 +76,7 @@ class Learned:
             "per_axis": dict(self.ratio or {}),
             "over_fit": dict(self.over_fit or {}),
             "with_hints": self.with_hints,
+            "fit_alone": self.fit_alone,
         }
 
 
@@ -174,12 +178,15 @@ class Learner:
         compared = [start, beside, plain.judged, unseen, found.judged]
         base, without, fitted, bare, after = self._errors(compared, rows)
         verdict, change = _judged(found.outcome, bare, after), _over(after, without)
-        if not (verdict.accepted and accept(without, after, "prediction").accepted):
+        worse = plain.acceptance.accepted and accept(after, fitted, "prediction").accepted
+        if worse or not (verdict.accepted and accept(without, after, "prediction").accepted):
             return model, learned
         if self.start is not None or self.profile.hull.has_model:
             # About a hull that is known the refitted one, to all rows and with the noise's colour, is the better estimate; what
             # decides, and is told, are the errors of the one that has not seen these rows.
-            stored, _ = self._on_top(wider, wider)
+            stored, on_top = self._on_top(wider, wider)
+            if on_top.fit_alone:
+                return model, learned
         else:
             stored = replace(found.model, accepted=True, scores=_scores(base, after, found.outcome))
         says = (
@@ -238,6 +245,8 @@ class Learner:
         if verdict.accepted:
             stored = replace(found.model, accepted=True, scores=_scores(before, after, found.outcome))
         over_fit = _over(best, fitted)
+        if stored is not None and plain.acceptance.accepted and accept(best, fitted, "prediction").accepted:
+            return self._instead(base.name, known, best, fitted)
         said = _says(what, by_axis(_over(after, known)), verdict, "the model without it")
         if plain.acceptance.accepted and _fit_is_better(best, fitted):
             said += (
@@ -245,6 +254,18 @@ class Learner:
                 f"{float(np.mean(over_fit)):.2f} times as large."
             )
         return stored, Learned(verdict.accepted, said, verdict.reasons, by_axis(_over(after, known)), by_axis(over_fit))
+
+    def _instead(self, name: str, known: Floats, best: Floats, fitted: Floats) -> tuple[Model, Learned]:
+        """Return the model of the fit alone, which predicts better than any on what is diagnosed or examined."""
+        plain, over_fit = self._plain.outcome, _over(fitted, fitted)
+        times = float(np.mean(_over(best, fitted)))
+        said = (
+            "The model of ferryid fit, which knows no findings, predicts these logs better and is stored: with that of the "
+            f"diagnosis the held-out squared prediction error is {times:.2f} times as large."
+        )
+        ratio = by_axis(_over(fitted, known))
+        found = Learned(True, said, plain.acceptance.reasons, ratio, by_axis(over_fit), fit_alone=True)
+        return replace(plain.model, name=name), found
 
     def _plain_and_remainder(self, base: Model) -> tuple[_Fitted, _Candidate]:
         """Return the fit alone, and that to what a model leaves, made side by side unless their rows would fill the memory."""

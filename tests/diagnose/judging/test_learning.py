@@ -357,10 +357,12 @@ def test_withheld_signals_are_not_learned_from() -> None:
         (0.8, 60.0, 50.0, 70.0, "first", "on top of the findings is part of the model"),
         # The fit is better, and so is the correction on the hull as it was.
         (0.8, 80.0, 50.0, 50.0, "second", "on the hull as it was before the diagnosis is part of the model"),
-        # The fit is better than either: told.
-        (0.8, 80.0, 90.0, 40.0, "first", "The model of ferryid fit predicts these logs better: .* 2.00 times as large"),
+        # The fit is better than either, and takes their place.
+        (0.8, 80.0, 90.0, 40.0, "fit", "The model of ferryid fit, which knows no findings, .* 2.00 times as large"),
+        # It is better by less than what a model is accepted for: told.
+        (0.8, 80.0, 90.0, 77.0, "first", "The model of ferryid fit predicts these logs better: .* 1.04 times as large"),
         # What folds speak against is not stored, whatever the held-out rows say.
-        (1.1, 60.0, 50.0, 90.0, "none", "on folds of the training rows .* 1.10 times as large"),
+        (1.1, 60.0, 50.0, 99.0, "none", "on folds of the training rows .* 1.10 times as large"),
     ],
 )
 def test_which_correction_is_stored(
@@ -375,7 +377,10 @@ def test_which_correction_is_stored(
     models = {name: replace(diagnosed, settings={**diagnosed.settings, "test": name}, scores=scores) for name in errors}
 
     def fit(_: Learner) -> SimpleNamespace:
-        return SimpleNamespace(outcome=SimpleNamespace(acceptance=good, judged=models["fit"]), validation=rows)
+        stored = replace(models["fit"], accepted=True)
+        return SimpleNamespace(
+            outcome=SimpleNamespace(acceptance=good, judged=models["fit"], model=stored), validation=rows
+        )
 
     def remainder(_: Learner, base: Model) -> SimpleNamespace:
         estimators = (EstimatorScore("weak", folds, 0.5, True),)
@@ -398,6 +403,7 @@ def test_which_correction_is_stored(
     assert stored.settings.get("test", "none") == kept
     assert learned.accepted == stored.accepted == (kept != "none")
     assert re.search(told, learned.says), learned.says
+    assert learned.fit_alone == (kept == "fit")
     assert learned.over_fit == dict.fromkeys(AXES, pytest.approx(errors[kept] / fitted))
     # One set of figures: those of the rows on which the models were compared, not of the fit's own.
     assert sum("On held-out data" in one for one in learned.reasons) == 1
