@@ -177,6 +177,11 @@ class FitData(ABC):
         return ()
 
     @property
+    def condition_notes(self) -> tuple[str, ...]:
+        """Why no wind is estimated where the profile has its load, as sentences."""
+        return ()
+
+    @property
     def condition_kinds(self) -> tuple[KindOutcome, ...]:
         """What spoke for each kind of condition that was considered besides wind."""
         return ()

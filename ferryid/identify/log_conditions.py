@@ -60,6 +60,8 @@ class Conditions:
         What the conditions add to the covariance of gains and intercept of the weak form, by axis, shape (3, K + 1, K + 1).
     blown
         The load as a function of the mean wind, of the logs whose wind is estimated, by their numbers.
+    indistinct
+        True where no wind is estimated, as hull, wind and steady forces of the logs cannot be told apart.
     """
 
     wind: Floats
@@ -69,6 +71,7 @@ class Conditions:
     load: tuple[Floats, ...]
     added: Floats
     blown: Mapping[int, BlownLoad] = field(default_factory=dict)
+    indistinct: bool = False
 
     @classmethod
     def none(cls, windows: Sequence[WeakRows], K: int) -> Conditions:
@@ -249,6 +252,8 @@ def estimate_conditions(
         return nothing
     problem = _Problem(windows, terms, mask, prior_spread, posed, length_s / STRIDES)
     wind, covariance = problem.solve(loads)
+    if not problem.converged and problem.force_spread > IDENTIFY.most_steady_force:
+        return replace(nothing, indistinct=True)
     return Conditions(
         wind,
         covariance,
@@ -352,6 +357,8 @@ class _Problem:
         self.slopes = [np.zeros((len(one), 3, 2)) for one in windows]
         self.gains = np.zeros((len(terms), 3))
         self.intercept = np.zeros(3)
+        self.converged = False
+        """Whether another step would change nothing."""
         self.settled = False
         """Whether spreads and noise stay as they are."""
 
@@ -382,6 +389,7 @@ class _Problem:
             covariance = self._step(loads, wind)
             moved = np.abs(self._hull() - hull) / np.sqrt(np.maximum(np.diag(self.inverse), 1e-300))
             if np.abs(wind - before).max() < 1e-3 or (self.settled and moved.max() < IDENTIFY.settled_step):
+                self.converged = True
                 break
         missing = [k for k in range(L) if k not in loads]
         wind[missing], covariance[missing] = np.nan, np.nan

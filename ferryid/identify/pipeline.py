@@ -247,6 +247,7 @@ def accept_estimate(
             *data.warnings(excitation, scores),
             *free_run_warnings(free_base, free_new),
             *sign_changes(model),
+            *told.condition_notes,
             *final.notes,
         ),
         logs=logs,

@@ -180,7 +180,16 @@ class IdentifyThresholds:
         20, "steps", "of the estimate of how much steady forces differ between logs", "derived: it no longer changes"
     )
     condition_steps: int = threshold(
-        25, "steps", "of the joint estimate of hull and conditions of logs", "derived: it no longer changes"
+        25,
+        "steps",
+        "of the joint estimate of hull and conditions of logs",
+        "convention: simulated winds no longer change after 15; what still does is near none, or is told by the next",
+    )
+    most_steady_force: float = threshold(
+        1.0,
+        "of the scatter of the windows",
+        "spread of steady forces of logs above which winds that did not settle are not told apart from them and from the hull",
+        "derived: steady forces are a part of what is left over; they grow past it where winds drift with them",
     )
     sample_logs: int = threshold(
         36,

@@ -159,6 +159,16 @@ class WeakData(LogData):
         return self.conditions.listed(self.log_names) if self.own is None else self.own.winds(self.log_names)
 
     @property
+    def condition_notes(self) -> tuple[str, ...]:
+        """Why no wind is estimated where the profile has its load, as sentences."""
+        if not self.conditions.indistinct:
+            return ()
+        return (
+            "No steady wind of single logs is estimated: hull, wind and other steady forces cannot be told apart in them. "
+            "Measure the wind, or check the wind areas in the profile.",
+        )
+
+    @property
     def condition_kinds(self) -> tuple[KindOutcome, ...]:
         """What spoke for each kind of condition that was considered besides wind."""
         return self.own_kinds

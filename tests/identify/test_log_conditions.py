@@ -249,3 +249,22 @@ def test_many_logs_begin_as_some_of_them_end(monkeypatch: pytest.MonkeyPatch) ->
     assert steps.count(6) < steps.count(3)
     np.testing.assert_allclose(found.wind, every.wind, atol=0.1)
     np.testing.assert_allclose(found.wind, np.broadcast_to(TRUE, (6, 2)), atol=0.4)
+
+
+@pytest.mark.parametrize(("converged", "spread", "told"), [(False, 1.1, True), (True, 1.1, False), (False, 0.9, False)])
+def test_winds_that_drift_with_steady_forces_are_not_given(
+    monkeypatch: pytest.MonkeyPatch, converged: bool, spread: float, told: bool
+) -> None:
+    solve = log_conditions._Problem.solve
+
+    def solved(self: log_conditions._Problem, loads: Any) -> tuple[Floats, Floats]:
+        found = solve(self, loads)
+        self.converged, self.force_spread = converged, spread * IDENTIFY.most_steady_force
+        return found
+
+    monkeypatch.setattr(log_conditions._Problem, "solve", solved)
+    data = data_of([measured(0, seconds=300.0, jitter=0.01, noise=4.0, force=blown)])
+    assert (data.winds == ()) == told
+    assert data.conditions.indistinct == told
+    assert ["cannot be told apart" in one for one in data.condition_notes] == [True] * told
+    assert data.conditions.load[0].any() != told
