@@ -183,12 +183,12 @@ class IdentifyThresholds:
         25,
         "steps",
         "of the joint estimate of hull and conditions of logs",
-        "convention: simulated winds no longer change after 15; what still does is near none, or is told by the next",
+        "convention: simulated winds no longer change after 15; what still does is near none, or is as below",
     )
     most_steady_force: float = threshold(
         1.0,
         "of the scatter of the windows",
-        "spread of steady forces of logs above which winds that did not settle are not told apart from them and from the hull",
+        "spread of steady forces of logs above which winds that did not settle are not distinguished from them and the hull",
         "derived: steady forces are a part of what is left over; they grow past it where winds drift with them",
     )
     sample_logs: int = threshold(

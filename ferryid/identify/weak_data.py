@@ -164,7 +164,7 @@ class WeakData(LogData):
         if not self.conditions.indistinct:
             return ()
         return (
-            "No steady wind of single logs is estimated: hull, wind and other steady forces cannot be told apart in them. "
+            "No steady wind of single logs is estimated: hull, wind and other steady forces cannot be distinguished. "
             "Measure the wind, or check the wind areas in the profile.",
         )
 

@@ -266,5 +266,5 @@ def test_winds_that_drift_with_steady_forces_are_not_given(
     data = data_of([measured(0, seconds=300.0, jitter=0.01, noise=4.0, force=blown)])
     assert (data.winds == ()) == told
     assert data.conditions.indistinct == told
-    assert ["cannot be told apart" in one for one in data.condition_notes] == [True] * told
+    assert ["cannot be distinguished" in one for one in data.condition_notes] == [True] * told
     assert data.conditions.load[0].any() != told
