@@ -138,21 +138,27 @@ class PredictionWindows:
 
         Infinite for a model whose mass matrix cannot be inverted.
         """
-        windows = self.judged
+        nothing = (np.zeros((0, 3)),) * 3
+        every, base, model = (np.concatenate(part) for part in zip(nothing, *self.predicted(found), strict=True))
+        found_scores = force_scores(every, base, model, np.ones(len(every), dtype=bool))
+        return found_scores.without_sway() if self.settings.reduced else found_scores
+
+    def predicted(self, found: Coefficients) -> list[tuple[Floats, Floats, Floats]]:
+        """Return the forces of the windows of every log in which models are judged, shape (J, 3) each.
+
+        As measured, and as base model and new model have them: apart by the force that an error of the acceleration is.
+        """
         terms = self.functions.terms
         added = effective_mass(self.profile, self.settings.scale, terms, found.theta) - self.base_mass
-        tau, base, model = [np.zeros((0, 3))], [np.zeros((0, 3))], [np.zeros((0, 3))]
-        for one in windows:
+        forces = []
+        for one in self.judged:
             estimate = one.base(one.by_velocity) + one.basis(terms, one.by_velocity) @ found.theta + found.intercept
-            tau.append(one.force)
-            base.append(one.reference(self.base_mass))
             inertia, mass = one.inertia, one.inertia + added
             if self.settings.reduced:
                 inertia, mass = without_sway_coupling(inertia), without_sway_coupling(mass)
-            model.append(one.force - _on_mass(inertia, mass, one.force - estimate))
-        every = np.concatenate(tau)
-        found_scores = force_scores(every, np.concatenate(base), np.concatenate(model), np.ones(len(every), dtype=bool))
-        return found_scores.without_sway() if self.settings.reduced else found_scores
+            model = one.force - _on_mass(inertia, mass, one.force - estimate)
+            forces.append((one.force, one.reference(self.base_mass), model))
+        return forces
 
     def scores(self, found: Coefficients) -> ModelScores:
         """Return the errors of a model as a model file has them."""

@@ -89,6 +89,7 @@ def render(
         window_s=f"{found.settings.window_s:g}",
         test_window_s=f"{plain['test_window_s']:g}",
         settings=plain["settings"],
+        found=found,
     )
     return page, drawings
 

@@ -27,20 +27,24 @@ def supported_structure(one: StructureComparison) -> str:
 
 def render_structures(found: StructureSweep) -> str:
     """Return a comparison of structures for a terminal."""
-    lines = [supported_structure(found.by["blocks"]), ""]
+    lines = [supported_structure(found.by["blocks"]), *([found.estimator_says] if found.estimator_says else []), ""]
     for key, one in found.by.items():
         lines += [
-            f"by {BY[key]}, {counted(one.folds, 'fold')}, {counted(one.rows, 'row')}, {counted(one.blocks, 'block')}",
-            *_scores(one),
+            f"by {BY[key]}, {counted(one.folds, 'fold')}, {counted(one.rows, found.tested)}, {counted(one.blocks, 'block')}",
+            *_scores(one, found.error),
             "",
         ]
-        lines += [f"by {BY[key]}: MSE over that of {one.structures[0].title}, 95 % intervals", *_intervals(one), ""]
+        lines += [
+            f"by {BY[key]}: {found.error} over that of {one.structures[0].title}, 95 % intervals",
+            *_intervals(one),
+            "",
+        ]
     lines += [f"left out: {name}: {reason}" for name, reason in found.unusable.items()]
     lines += [f"note: {note}" for note in found.notes]
     return "\n".join(lines).rstrip()
 
 
-def _scores(one: StructureComparison) -> list[str]:
+def _scores(one: StructureComparison, error: str) -> list[str]:
     lines = [
         f"  {'basis':<13}{'structure':<11}{'terms':>9}{'comp.':>6}"
         + "".join(f"{axis:>8}" for axis in AXES)
@@ -54,7 +58,7 @@ def _scores(one: StructureComparison) -> list[str]:
             f"{structure.components:>6}{ratios}{structure.score:>8.4f}{p}"
         )
     lines.append(
-        "  terms in surge/sway/yaw; axes: MSE over the base model's; score: each axis over its least MSE, mean"
+        f"  terms in surge/sway/yaw; axes: {error} over the base model's; score: each axis over its least, mean"
     )
     lines.append(
         "  p: that no other is better; · not significantly worse than the best at 95 %; * of these the fewest coefficients"

@@ -189,7 +189,7 @@ NO_DECISION = {
         identify.physical_checks MOST_ROWS
         identify.settings FOLDS
         identify.split EVERY
-        identify.sweeps.structure_sweep DRAWS
+        identify.sweeps.structure_ranking DRAWS
         identify.sweeps.weak_sweep USUAL _WINDOWS_A_FOLD
         identify.window_length TRAINING_LENGTHS
         models.forces.estimator CHUNK_ROWS

@@ -40,7 +40,7 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
-SETTINGS = FitSettings()
+SETTINGS = FitSettings(estimator="derivative")
 Run = Callable[..., StructureSweep]
 NAMELESS = replace(PROFILE, hull=replace(PROFILE.hull, length_m=float("nan")), path="boat.toml")
 

@@ -20,7 +20,6 @@ from ferryid.identify.pipeline import fit_opened
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.sweeps import weak_sweep
 from ferryid.identify.sweeps.settings_sweep import Sweep, sweep_json, sweep_settings
-from ferryid.identify.sweeps.structure_sweep import sweep_structures
 from ferryid.regression.bases import make_basis
 from ferryid.report.sweep_report import render
 from ferryid.report.sweep_text import render_sweep
@@ -134,8 +133,6 @@ def test_what_makes_no_sense_is_refused(run: Run, tmp_path: Path) -> None:
         assert "\n" not in str(error.value)
     with pytest.raises(FerryIdError, match="--components: 50 are more than the 18 functions"):
         run("window", [log], replace(SETTINGS, components=50))
-    with pytest.raises(FerryIdError, match=r"--estimator weak: bases are compared .*Fix: "):
-        sweep_structures(["log"], PROFILE, SETTINGS, RUN)
     with pytest.raises(FerryIdError, match=r"there is no estimator called 'week'.*weak"):
         FitSettings(estimator="week")
 
@@ -208,22 +205,28 @@ def test_folds_are_apart_and_hold_all_windows() -> None:
         )
         for seed, s in ((1, 240.0), (2, 20.0), (3, 60.0))
     ]
-    folds = weak_sweep._by_stretches(logs, 5)
-    tested = [[len(part.measured) for part in weak_sweep._tested(logs, fold)] for fold in folds]
+    folds = weak_sweep.folds_by_stretches(logs, 5)
+    tested = [[len(part.measured) for part in weak_sweep.tested_parts(logs, fold)] for fold in folds]
     assert min(one[0] for one in tested) > 3
     # A log too short for five stretches is tested whole, in one fold; the next begins in the fold after.
     assert [one[1] > 0 for one in tested] == [True, False, False, False, False]
     assert [one[2] > 0 for one in tested] == [False, True, True, True, False]
     for fold in folds:
-        for log, test, train in zip(logs, weak_sweep._tested(logs, fold), weak_sweep._trained(logs, fold), strict=True):
+        for log, test, train in zip(
+            logs, weak_sweep.tested_parts(logs, fold), weak_sweep.trained_parts(logs, fold), strict=True
+        ):
             if len(test.measured) and len(train.measured):
                 apart = np.abs(test.measured.start[:, None] - train.measured.start[None, :])
                 assert apart.min() >= log.length + log.purge_s * log.rate_hz - 1
-    whole = weak_sweep._by_logs(logs)
+    whole = weak_sweep.folds_by_logs(logs)
     assert len(whole) == 3
     for number, fold in enumerate(whole):
-        assert [len(part.measured) > 0 for part in weak_sweep._tested(logs, fold)] == [k == number for k in range(3)]
-        assert [len(part.measured) > 0 for part in weak_sweep._trained(logs, fold)] == [k != number for k in range(3)]
+        assert [len(part.measured) > 0 for part in weak_sweep.tested_parts(logs, fold)] == [
+            k == number for k in range(3)
+        ]
+        assert [len(part.measured) > 0 for part in weak_sweep.trained_parts(logs, fold)] == [
+            k != number for k in range(3)
+        ]
 
 
 @pytest.mark.slow

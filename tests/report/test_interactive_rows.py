@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -175,8 +176,16 @@ def show(page: Page, made: Timeline, out: Path) -> None:
     """Open a page with one figure along another axis than time."""
     interactive = make_interactive({0: made}, out / "reports" / "a", out)
     sections = [{"one": made, "timeline": 1, "svg": "<svg></svg>", "best": "x", "simplest": "x", "table": []}]
+    found = SimpleNamespace(tested="row", error="MSE", weak=False, estimator_says="")
     text = template("structures.html").render(
-        made={}, vessel="ferry", axes=(), sections=sections, unusable={}, settings={}, assets=interactive.assets
+        made={},
+        found=found,
+        vessel="ferry",
+        axes=(),
+        sections=sections,
+        unusable={},
+        settings={},
+        assets=interactive.assets,
     )
     page.faults.clear()
     page.open(write(out / "reports" / "a", text, interactive.files()))

@@ -13,7 +13,7 @@ from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.identify.archive import archive_folds
 from ferryid.identify.fit_warnings import log_warnings
 from ferryid.identify.inputs import read_logs
-from ferryid.identify.log_sums import LogSums, folds_by_blocks, folds_by_logs, force_free_axes, sum_log
+from ferryid.identify.log_sums import folds_by_blocks, folds_by_logs, force_free_axes, sum_log
 from ferryid.identify.model_selection import Selection, select_model, windows_to_try
 from ferryid.identify.outcome import EstimatorScore
 from ferryid.identify.pipeline import estimator_for
@@ -36,6 +36,7 @@ _ALSO = {
     "--inertia": "inertia", "--delta": "delta", "--sigma": "sigma", "--zeta": "zeta",
 }  # fmt: skip
 """Options of a sweep that a fit has as well, and their settings."""
+_DERIVATIVE = "Estimator auto: the derivative's was swept"
 BY = {"blocks": "contiguous stretches of every log", "logs": "whole logs"}
 
 
@@ -84,7 +85,7 @@ class Sweep:
     @property
     def tested(self) -> str:
         """What a fold tests: a row, or a window."""
-        return "window" if self.weak else "row"
+        return "overlapping window" if self.weak else "row"
 
     @property
     def error(self) -> str:
@@ -167,15 +168,14 @@ def sweep_settings(
         settings = replace(settings, components="auto")
     opened = () if archive else tuple(read_logs(logs, profile, settings, run))
     request = _Request(what, tuple(logs), opened, profile, settings, run, tuple(windows_s), folds, archive)
-    kind, says, scores = (asked, "", ()) if asked != "auto" else _as_a_fit(request)
+    kind, says, scores = _as_a_fit(request)
     if kind == "weak":
         try:
             found = _sweep_weak(request.of("weak"))
         except TooShort as error:
             if asked != "auto":
                 raise
-            told = f"as the weak form, which a fit uses, cannot be cross-validated: {_cause(error)}."
-            says = f"Estimator auto: the derivative's was swept, {told}"
+            says = derivative_instead(error)
             found = _sweep_derivative(request.of("derivative"))
     else:
         found = _sweep_derivative(request.of("derivative"))
@@ -203,20 +203,37 @@ class _Request:
 
 def _as_a_fit(request: _Request) -> tuple[str, str, tuple[EstimatorScore, ...]]:
     """Return the estimator that a fit to the logs uses, a sentence that says so and why, and how well either predicts."""
-    derivative = "Estimator auto: the derivative's was swept"
-    if request.archive:
-        return "derivative", f"{derivative}, as a fit to an archive uses it; --estimator weak sweeps the weak form.", ()
-    if request.windows_s:
+    if request.settings.estimator == "auto" and request.archive:
+        return (
+            "derivative",
+            f"{_DERIVATIVE}, as a fit to an archive uses it; --estimator weak sweeps the weak form.",
+            (),
+        )
+    if request.settings.estimator == "auto" and request.windows_s:
         told = (
             "as --windows are its smoothing windows; --estimator weak takes them as lengths of the weak form's windows."
         )
-        return "derivative", f"{derivative}, {told}", ()
+        return "derivative", f"{_DERIVATIVE}, {told}", ()
+    return as_a_fit(request.opened, request.profile, request.settings, request.run)
+
+
+def derivative_instead(error: TooShort) -> str:
+    """Return why the derivative's estimator is swept although a fit uses the weak form, as a sentence."""
+    return f"{_DERIVATIVE}, as the weak form, which a fit uses, cannot be cross-validated: {_cause(error)}."
+
+
+def as_a_fit(
+    opened: Sequence[Opened], profile: Profile, settings: FitSettings, run: RunContext
+) -> tuple[str, str, tuple[EstimatorScore, ...]]:
+    """Return the estimator that a fit to logs uses; of ``"auto"`` why, as a sentence, and how well either predicts."""
+    if settings.estimator != "auto":
+        return settings.estimator, "", ()
     try:
-        chosen = estimator_for(request.opened, request.profile, request.settings, request.run)
+        chosen = estimator_for(opened, profile, settings, run)
     except TooShort as error:
-        return "derivative", f"{derivative}, as a fit cannot compare the two: {_cause(error)}.", ()
+        return "derivative", f"{_DERIVATIVE}, as a fit cannot compare the two: {_cause(error)}.", ()
     if chosen.why:
-        return "derivative", f"{derivative}, as a fit uses it: {chosen.why}.", ()
+        return "derivative", f"{_DERIVATIVE}, as a fit uses it: {chosen.why}.", ()
     told = ", ".join(_fold_error(one) for one in chosen.scores)
     name = "the weak form" if chosen.estimator == "weak" else "the derivative's"
     says = (
@@ -318,7 +335,7 @@ def _from_logs(
         run.progress(f"cutting {one.recording.name} into pieces")
         pieces.append(sum_log(profile, settings, functions, one.measured, windows, blocks=folds))
     cuts = {"blocks": folds_by_blocks(pieces, folds)} | ({"logs": folds_by_logs(pieces)} if len(pieces) > 1 else {})
-    told = [log_json(one, log) for one, log in zip(opened, pieces, strict=True)]
+    told = [log_json(one, int(log.test.n.sum())) for one, log in zip(opened, pieces, strict=True)]
     return windows, functions, force_free_axes(pieces), cuts, told
 
 
@@ -328,9 +345,8 @@ def check_folds(folds: int) -> None:
         raise FerryIdError(f"--folds: {folds} is no number of folds. Fix: give 2 to 20, {FOLDS} is usual")
 
 
-def log_json(one: Opened, log: LogSums) -> dict[str, Any]:
-    """Return name, hash, length and warnings of a log."""
-    rows = int(log.test.n.sum())
+def log_json(one: Opened, rows: int) -> dict[str, Any]:
+    """Return name, hash, length by the number of its rows, and warnings of a log."""
     return {
         "name": one.recording.name,
         "sha256": one.recording.sha256,

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.identify.outcome import EstimatorScore
 from ferryid.identify.settings import TEST_WINDOW_S, FitSettings
 from ferryid.identify.sweeps.settings_sweep import SCHEMA
 from ferryid.identify.thresholds import IDENTIFY
@@ -128,6 +129,10 @@ class StructureSweep:
         Bases that cannot be used here, and why.
     notes
         What a reader must know, as sentences.
+    asked, estimator_says, estimators
+        As in `ferryid.identify.sweeps.settings_sweep.Sweep`.
+    test_window_s
+        Window of the test rows, or length of the windows in which the weak form is judged [s].
     """
 
     vessel: str
@@ -137,6 +142,25 @@ class StructureSweep:
     by: Mapping[str, StructureComparison]
     unusable: Mapping[str, str]
     notes: tuple[str, ...]
+    asked: str = "derivative"
+    estimator_says: str = ""
+    estimators: tuple[EstimatorScore, ...] = ()
+    test_window_s: float = TEST_WINDOW_S
+
+    @property
+    def weak(self) -> bool:
+        """True where the weak form was fitted."""
+        return self.settings.estimator == "weak"
+
+    @property
+    def tested(self) -> str:
+        """What a fold tests: a row, or a window."""
+        return "overlapping window" if self.weak else "row"
+
+    @property
+    def error(self) -> str:
+        """What is compared."""
+        return "squared prediction error" if self.weak else "MSE"
 
 
 def structures_json(found: StructureSweep, report: str | None = None) -> dict[str, Any]:
@@ -151,12 +175,14 @@ def structures_json(found: StructureSweep, report: str | None = None) -> dict[st
         "logs": [dict(log) for log in found.logs],
         "settings": {**settings, **found.settings.scale},
         "window_s": found.settings.window_s,
-        "test_window_s": TEST_WINDOW_S,
+        "test_window_s": found.test_window_s,
         "block_s": found.block_s,
         "by": {key: _compared_json(one) for key, one in found.by.items()},
         "unusable": [{"basis": name, "reason": reason} for name, reason in found.unusable.items()],
         "choice": {"basis": chosen.basis, "structure": chosen.structure},
         "notes": list(found.notes),
+        "estimator": {"asked": found.asked, "swept": found.settings.estimator, "says": found.estimator_says},
+        "estimators": [one.to_json() for one in found.estimators],
         "report": report,
     }
 

@@ -1,8 +1,9 @@
 """Structures compared: every basis, decoupled and coupled, cross-validated on the same folds and the same test rows.
 
-The number of components is chosen anew within the training rows of every fold, so that no structure gains by having more to
-choose from; it is the one of least error there, as a simpler one near it would cost one structure more than another. Errors
-are kept block by block; from blocks drawn again come the intervals, and the structures that cannot be told from the best.
+By the estimator that a fit to the logs uses, or the one that is asked for; what follows is the derivative's. The number of
+components is chosen anew within the training rows of every fold, so that no structure gains by having more to choose from; it
+is the one of least error there, as a simpler one near it would cost one structure more than another. Errors are kept block by
+block; from blocks drawn again come the intervals, and the structures that cannot be told from the best.
 """
 
 from __future__ import annotations
@@ -21,27 +22,21 @@ from ferryid.identify.log_sums import LogSums, force_free_axes, sum_motions
 from ferryid.identify.model_selection import select_model
 from ferryid.identify.rows import basis_for, known_rows, rows_of
 from ferryid.identify.settings import FOLDS, TEST_WINDOW_S, FitSettings
-from ferryid.identify.split import correlation_time
-from ferryid.identify.sweeps.settings_sweep import BY, check_folds, log_json
-from ferryid.identify.sweeps.structure_comparison import (
-    Ratios,
-    Structure,
-    StructureComparison,
-    StructureSweep,
-    over_base,
-)
-from ferryid.identify.thresholds import IDENTIFY
+from ferryid.identify.split import TooShort, correlation_time
+from ferryid.identify.sweeps.settings_sweep import BY, as_a_fit, check_folds, derivative_instead, log_json
+from ferryid.identify.sweeps.structure_comparison import StructureComparison, StructureSweep, over_base
+from ferryid.identify.sweeps.structure_ranking import StructureErrors, rank_structures
+from ferryid.identify.sweeps.weak_structures import compare_weak
 from ferryid.models.forces import compute_residual
 from ferryid.regression import REGRESSION, CrossProducts, fit_simpls, total
 from ferryid.regression.bases import STRUCTURES, Basis, basis_names, with_hull_length
 from ferryid.regression.cross_validation import Curves, Folds, FoldSums, unpurged_parts
-from ferryid.regression.resampling import block_seconds, model_confidence_set, percentiles, times_drawn
+from ferryid.regression.resampling import block_seconds
 from ferryid.signals.smooth import Measured, smooth_measured
 from ferryid.signals.track import Motion
 from ferryid.types import Flags, Floats, Ints, RunContext
+from ferryid.vessel.dimensions import window_seconds
 from ferryid.vessel.profile import Profile
-
-DRAWS = 2000
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,18 +46,6 @@ class _Log:
     test: tuple[Motion, Floats]
     training: tuple[Motion, Floats]
     used: Flags
-
-
-@dataclass(frozen=True, eq=False)
-class _StructureErrors:
-    """A structure's choices, and its errors in blocks, shape (B, 3)."""
-
-    basis: str
-    functions: Basis
-    allowed: Flags
-    components: int
-    within: tuple[int, ...]
-    errors: Floats
 
 
 def sweep_structures(
@@ -88,14 +71,10 @@ def sweep_structures(
         For input that cannot be used, with file, cause and remedy.
     """
     check_folds(folds)
-    if settings.estimator == "weak":
-        raise FerryIdError(
-            "--estimator weak: bases are compared by the force errors of the derivative's rows. "
-            "Fix: leave it out, or compare sweep components --estimator weak --basis NAME of one basis and another"
-        )
-    settings = replace(settings, estimator="derivative")
     usable, unusable = usable_bases(settings, profile)
     opened = read_logs(logs, profile, settings, run)
+    kind, says, scores = as_a_fit(opened, profile, settings.on(profile), run)
+    asked, settings = settings.estimator, replace(settings, estimator=kind)
     motions = [smooth_measured(one.measured, TEST_WINDOW_S) for one in opened]
     bases = {
         name: {
@@ -108,6 +87,43 @@ def sweep_structures(
     made = [_log(profile, settings, one.measured, bases["modulus"]["coupled"]) for one in opened]
     run.progress("finding how long residuals remember")
     block_s = block_length(made, [one["decoupled"] for one in bases.values()])
+    if kind == "weak":
+        try:
+            by = compare_weak(opened, profile, settings.on(profile), usable, run, block_s=block_s, folds=folds)
+        except TooShort as error:
+            if asked != "auto":
+                raise
+            kind, settings = "derivative", replace(settings, estimator="derivative")
+            says = derivative_instead(error)
+    if kind == "derivative":
+        by = _compare_derivative(profile, settings, bases, made, run, block_s=block_s, folds=folds)
+    told = tuple(log_json(one, int(np.count_nonzero(log.used))) for one, log in zip(opened, made, strict=True))
+    return StructureSweep(
+        profile.name,
+        told,
+        settings,
+        block_s,
+        by,
+        unusable,
+        (*_notes(by, settings), *log_warnings([(log["name"], log["warnings"]) for log in told])),
+        asked=asked,
+        estimator_says=says,
+        estimators=scores,
+        test_window_s=window_seconds(profile) if kind == "weak" else TEST_WINDOW_S,
+    )
+
+
+def _compare_derivative(
+    profile: Profile,
+    settings: FitSettings,
+    bases: Mapping[str, Mapping[str, Basis]],
+    made: Sequence[_Log],
+    run: RunContext,
+    *,
+    block_s: float,
+    folds: int,
+) -> dict[str, StructureComparison]:
+    """Return structures compared by the derivative's estimator, by the way of cutting."""
     reach_s = max(TEST_WINDOW_S, settings.window_s)
     pieces: dict[str, list[LogSums]] = {}
     for name, one in bases.items():
@@ -119,21 +135,12 @@ def sweep_structures(
             for log in made
         ]
     by = {}
-    for key in ("blocks", "logs") if len(opened) > 1 else ("blocks",):
+    for key in ("blocks", "logs") if len(made) > 1 else ("blocks",):
         run.progress(f"cross-validating by {key}")
         by[key] = compare_structures(
-            profile, settings, bases, pieces, len(opened) if key == "logs" else folds, key == "logs"
+            profile, settings, bases, pieces, len(made) if key == "logs" else folds, key == "logs"
         )
-    told = tuple(log_json(one, log) for one, log in zip(opened, pieces["modulus"], strict=True))
-    return StructureSweep(
-        profile.name,
-        told,
-        settings,
-        block_s,
-        by,
-        unusable,
-        (*_notes(by, settings), *log_warnings([(log["name"], log["warnings"]) for log in told])),
-    )
+    return by
 
 
 def usable_bases(settings: FitSettings, profile: Profile) -> tuple[dict[str, str], dict[str, str]]:
@@ -197,7 +204,7 @@ def compare_structures(
     k, whole
         As in `ferryid.regression.cross_validation.folds.FoldSums`.
     """
-    tried: list[_StructureErrors] = []
+    tried: list[StructureErrors] = []
     base, rows = np.zeros((0, 3)), np.zeros(0)
     for name, logs in pieces.items():
         sums = FoldSums(1, k, whole=whole)
@@ -216,7 +223,7 @@ def compare_structures(
         for structure in STRUCTURES:
             functions = bases[name][structure]
             tried.append(_cross_validate(profile, settings, name, functions, folds, blocks, free, logs[0].log))
-    return _rank(tried, base, rows, len(folds.test))
+    return rank_structures(tried, base, rows, len(folds.test))
 
 
 def _cross_validate(
@@ -228,7 +235,7 @@ def _cross_validate(
     blocks: Sequence[tuple[int, CrossProducts]],
     free: Flags,
     where: str,
-) -> _StructureErrors:
+) -> StructureErrors:
     """Fit one structure without each fold in turn, as the other folds choose, and test it on the fold's blocks."""
     window = (settings.window_s,)
     whole = select_model(profile, settings, functions, window, folds, free, rule=Curves.best, where=where)
@@ -246,45 +253,7 @@ def _cross_validate(
         within.append(choice.components)
     errors = [cross.sse(fits[fold].coefficients[-1:], fits[fold].intercepts[-1:])[0] for fold, cross in blocks]
     allowed = without_inertia(functions.mask, functions.terms, whole.held)
-    return _StructureErrors(name, functions, allowed, whole.components, tuple(within), np.array(errors))
-
-
-def _rank(tried: Sequence[_StructureErrors], base: Floats, rows: Floats, folds: int) -> StructureComparison:
-    """Draw blocks, and order the structures by their score."""
-    errors = np.array([one.errors for one in tried])
-    mse = errors.sum(axis=1) / rows.sum()
-    least = mse.min(axis=0)
-    unit = np.where(least > 0.0, least, 1.0)
-    scores = (mse / unit).mean(axis=1)
-    times = times_drawn(len(rows), DRAWS, 0)
-    drawn = np.einsum("db,sbj->sdj", times, errors) / (times @ rows)[:, None]
-    p = model_confidence_set(scores, (drawn / unit).mean(axis=2).T, len(rows))
-    order = np.lexsort([[one.allowed.sum() for one in tried], scores.round(12)])
-    simplest = min(order, key=lambda number: tried[number].allowed.sum())
-
-    def against(number: int, other: int) -> Ratios:
-        with np.errstate(divide="ignore", invalid="ignore"):
-            value, ratios = mse[number] / mse[other], drawn[number] / drawn[other]
-        low, high = percentiles(ratios.T, len(rows), IDENTIFY.structure_level)
-        return Ratios(value, low, high)
-
-    structures = tuple(
-        Structure(
-            basis=tried[number].basis,
-            structure=tried[number].functions.structure,
-            functions=tried[number].functions,
-            allowed=tried[number].allowed,
-            components=tried[number].components,
-            within=tried[number].within,
-            mse=mse[number],
-            score=float(scores[number]),
-            p=float(p[number]),
-            against_best=against(number, order[0]),
-            against_simplest=against(number, simplest),
-        )
-        for number in order
-    )
-    return StructureComparison(structures, base.sum(axis=0) / rows.sum(), folds, int(rows.sum()), len(rows))
+    return StructureErrors(name, functions, allowed, whole.components, tuple(within), np.array(errors))
 
 
 def _log(profile: Profile, settings: FitSettings, measured: Measured, functions: Basis) -> _Log:

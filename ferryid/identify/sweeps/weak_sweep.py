@@ -41,7 +41,7 @@ _WINDOWS_A_FOLD = 4
 
 
 @dataclass(frozen=True)
-class _Fold:
+class Fold:
     """Parts of every log that test, from the first row to before the second; other rows train, but for a purge around them."""
 
     tested: tuple[tuple[int, int], ...]
@@ -99,11 +99,11 @@ def sweep_weak(
     if archive:
         made, functions = _from_archive(logs, profile, at, run)
     else:
-        made, functions = _from_logs(opened or read_logs(logs, profile, settings, run), profile, at, run)
+        made, functions = average_logs(opened or read_logs(logs, profile, settings, run), profile, at, run)
     check_components(settings.components, functions)
-    cuts = {"blocks": _by_stretches(made[test_s], folds)}
+    cuts = {"blocks": folds_by_stretches(made[test_s], folds)}
     if len(made[test_s]) > 1:
-        cuts["logs"] = _by_logs(made[test_s])
+        cuts["logs"] = folds_by_logs(made[test_s])
     notes, tried = [], []
     for length_s in lengths_s:
         why = _impossible(profile, at[length_s], functions, made[length_s], cuts)
@@ -142,9 +142,10 @@ _Made = Mapping[float, Sequence[LogWindows]]
 """Windows of every log, by their length [s]."""
 
 
-def _from_logs(
+def average_logs(
     logs: Sequence[Opened], profile: Profile, at: Mapping[float, FitSettings], run: RunContext
 ) -> tuple[_Made, Basis]:
+    """Return windows of every log, by their length [s], and the basis that all logs allow."""
     settings = next(iter(at.values()))
     opened = [smoothed(one, settings.window_s, settings.smoother) for one in logs]
     motions = numbered_names([one.motion for one in opened])
@@ -179,7 +180,7 @@ def _from_archive(
     return made, functions
 
 
-def _by_stretches(logs: Sequence[LogWindows], folds: int) -> list[_Fold]:
+def folds_by_stretches(logs: Sequence[LogWindows], folds: int) -> list[Fold]:
     """Return folds of contiguous stretches of every log, each in as many as it has windows for, from where the last ended."""
     tested = [[(0, 0)] * len(logs) for _ in range(folds)]
     first = 0
@@ -193,20 +194,21 @@ def _by_stretches(logs: Sequence[LogWindows], folds: int) -> list[_Fold]:
         for place in range(parts):
             tested[(first + place) % folds][number] = edges[place], edges[place + 1]
         first = (first + parts) % folds
-    return [_Fold(tuple(one)) for one in tested]
+    return [Fold(tuple(one)) for one in tested]
 
 
-def _by_logs(logs: Sequence[LogWindows]) -> list[_Fold]:
+def folds_by_logs(logs: Sequence[LogWindows]) -> list[Fold]:
     """Return folds of whole logs."""
     groups = min(MOST_GROUPS, len(logs))
     end = np.iinfo(np.int64).max
     return [
-        _Fold(tuple((0, end) if number % groups == group else (0, 0) for number in range(len(logs))))
+        Fold(tuple((0, end) if number % groups == group else (0, 0) for number in range(len(logs))))
         for group in range(groups)
     ]
 
 
-def _trained(logs: Sequence[LogWindows], fold: _Fold) -> list[WindowPart]:
+def trained_parts(logs: Sequence[LogWindows], fold: Fold) -> list[WindowPart]:
+    """Return the windows of every log that train in a fold."""
     parts = []
     for log, (low, high) in zip(logs, fold.tested, strict=True):
         purge = round(log.purge_s * log.rate_hz)
@@ -215,7 +217,8 @@ def _trained(logs: Sequence[LogWindows], fold: _Fold) -> list[WindowPart]:
     return parts
 
 
-def _tested(logs: Sequence[LogWindows], fold: _Fold) -> list[WindowPart]:
+def tested_parts(logs: Sequence[LogWindows], fold: Fold) -> list[WindowPart]:
+    """Return those that test."""
     return [log.parts[0].between(*rows, log.length) for log, rows in zip(logs, fold.tested, strict=True)]
 
 
@@ -224,11 +227,11 @@ def _impossible(
     settings: FitSettings,
     functions: Basis,
     logs: Sequence[LogWindows],
-    cuts: Mapping[str, Sequence[_Fold]],
+    cuts: Mapping[str, Sequence[Fold]],
 ) -> str:
     """Return why windows of a length cannot be fitted in every fold; empty where they can."""
     for fold in (one for cut in cuts.values() for one in cut):
-        parts = _trained(logs, fold)
+        parts = trained_parts(logs, fold)
         if why := WindowedData.of(profile, settings, functions, logs, parts, parts).impossible:
             return why
     return ""
@@ -240,14 +243,16 @@ def _select(
     lengths: Sequence[tuple[FitSettings, Sequence[LogWindows]]],
     judged: Sequence[LogWindows],
     functions: Basis,
-    folds: Sequence[_Fold],
+    folds: Sequence[Fold],
 ) -> Selection:
     """Return length and component count of the least prediction error; see `_rule`."""
     whole = [log.parts[0] for log in judged]
     usual = replace(settings, weak_window_s=judged[0].length_s)
     split = Split("folds", (), (), judged[0].purge_s)
     every = KnownWindows(profile, usual, functions, (), split, tuple(whole), tuple(whole))
-    tests = [(fold, replace(every, validated=tuple(_tested(judged, fold)), chosen=every.steadied)) for fold in folds]
+    tests = [
+        (fold, replace(every, validated=tuple(tested_parts(judged, fold)), chosen=every.steadied)) for fold in folds
+    ]
     tests = [(fold, test) for fold, test in tests if any(len(one) for one in test.validation)]
     if len(tests) < 2:
         raise TooShort(
@@ -263,7 +268,7 @@ def _select(
     errors, base = [], []
     for each, logs in lengths:
         for fold, test in tests:
-            parts = _trained(logs, fold)
+            parts = trained_parts(logs, fold)
             data = WindowedData.of(profile, each, functions, logs, parts, parts)
             found = [test.errors(one) for one in _counts(data, replace(functions, mask=mask))]
             errors.append([one.mse_model for one in found])
