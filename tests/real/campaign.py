@@ -17,7 +17,7 @@ import numpy as np
 
 from ferryid.compare import evaluate
 from ferryid.diagnose.judging.campaign_conditions import ConditionTest
-from ferryid.diagnose.judging.campaign_evidence import EXCHANGED, MIRRORED, Gain
+from ferryid.diagnose.judging.campaign_evidence import EXCHANGED, MIRRORED, SHIFTED, Gain
 from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
@@ -318,8 +318,8 @@ def _apart(study: esso.Study) -> list[str]:
 def _tests(study: esso.Study) -> list[str]:
     lines = [
         "| condition | log evidence over none [nat] | held-out gain [nat] | over the placebo on the mirrored heading: "
-        "evidence; gain | on another log's heading | |",
-        "|---|---|---|---|---|---|",
+        "evidence; gain | on another log's heading | on the heading at other times | |",
+        "|---|---|---|---|---|---|---|",
     ]
     return lines + [
         f"| {one.effect} | {one.evidence:+.0f} | {_range(one.gain)} | {_over(one)} | "
@@ -329,7 +329,7 @@ def _tests(study: esso.Study) -> list[str]:
 
 
 def _over(test: ConditionTest) -> str:
-    places = (MIRRORED, EXCHANGED)
+    places = (MIRRORED, EXCHANGED, SHIFTED)
     made = (test.placebos.get(one) for one in places)
     return " | ".join("" if one is None else f"{one.evidence:+.0f}; {_range(one.gain)}" for one in made)
 
@@ -350,8 +350,8 @@ def _gains(study: esso.Study) -> list[str]:
 def _controls(study: esso.Study) -> list[str]:
     lines = [
         "| control | condition | log evidence over none [nat] | held-out gain [nat] | over its own placebo on the mirrored "
-        "heading: evidence; gain | on another log's heading | named in | hint in |",
-        "|---|---|---|---|---|---|---|---|",
+        "heading: evidence; gain | on another log's heading | on the heading at other times | named in | hint in |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     for name, control in study.controls.items():
         for one in control.tests:

@@ -30,6 +30,8 @@ from ferryid.diagnose.inference.campaign_model import Campaign
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.campaign_errors import LogErrors
 from ferryid.diagnose.judging.campaign_evidence import (
+    EXCHANGED,
+    MIRRORED,
     Gain,
     HeldOutLoss,
     held_out_loss,
@@ -370,7 +372,7 @@ def _against_others(
         title = effects()[name].title.lower()
         progress(f"estimating a {title} on headings that the vessel did not have")
         instead = with_conditions(campaign, frozenset([name, *test.beside]))
-        for where, placebo in placebos(instead, name).items():
+        for where, placebo in placebos(instead, name, (MIRRORED, EXCHANGED)).items():
             if estimate_campaign(placebo, noise=test.fit.noise, bare=bare).evidence > test.fit.evidence:
                 outdone.append(f"{title} on {where}")
     return replace(test, outdone=tuple(outdone))

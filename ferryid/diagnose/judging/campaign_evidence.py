@@ -28,7 +28,7 @@ from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.side_by_side import over
 from ferryid.types import Floats, Ints
 
-MIRRORED, EXCHANGED = "the heading mirrored", "another log's heading"
+MIRRORED, EXCHANGED, SHIFTED = "the heading mirrored", "another log's heading", "the heading at other times"
 
 
 @dataclass(frozen=True)
@@ -150,19 +150,21 @@ def _left(fit: CampaignFit, signals: Sequence[Floats]) -> float:
     return left
 
 
-def placebos(campaign: Campaign, effect: str) -> dict[str, Campaign]:
-    """Return the campaign with a condition that cannot be true: on the mirrored heading, and on that of another log.
+def placebos(
+    campaign: Campaign, effect: str, among: Sequence[str] = (MIRRORED, EXCHANGED, SHIFTED)
+) -> dict[str, Campaign]:
+    """Return the campaign with a condition that cannot be true: on the mirrored heading, on that of another log, or on a log's
+    own half of its length away.
 
     Headings that are all but the vessel's own, as those of logs of one manoeuvre, make none; nor do those of another log that
     differ by the same angle all along, as in turning circles: from another side, the condition is the same on them.
     """
     every = [member.windows.measurements.psi for member in campaign.members]
     others = [np.resize(every[(i + 1) % len(every)], len(psi)) for i, psi in enumerate(every)]
-    headings = {MIRRORED: [-psi for psi in every], EXCHANGED: others}
-    turns = {MIRRORED: _turn(every, headings[MIRRORED]), EXCHANGED: _turn(every, headings[EXCHANGED], steady=True)}
-    return {
-        name: _turned(campaign, effect, found) for name, found in headings.items() if turns[name] > JUDGING.placebo_turn
-    }
+    later = [np.roll(psi, len(psi) // 2) for psi in every]
+    headings = {MIRRORED: [-psi for psi in every], EXCHANGED: others, SHIFTED: later}
+    turns = {name: _turn(every, found, steady=name != MIRRORED) for name, found in headings.items()}
+    return {name: _turned(campaign, effect, headings[name]) for name in among if turns[name] > JUDGING.placebo_turn}
 
 
 def _turn(headings: Sequence[Floats], others: Sequence[Floats], *, steady: bool = False) -> float:

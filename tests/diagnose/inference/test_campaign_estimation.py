@@ -23,6 +23,7 @@ from ferryid.diagnose.judging.campaign_conditions import ConditionTest, PlaceboT
 from ferryid.diagnose.judging.campaign_evidence import (
     EXCHANGED,
     MIRRORED,
+    SHIFTED,
     Gain,
     imitated_share,
     placebos,
@@ -296,9 +297,10 @@ def test_references_that_measured_what_a_log_did_not_have_no_conditions() -> Non
 def test_like_headings_make_no_placebo() -> None:
     made = campaign()
     first = made.members[0]
-    assert set(placebos(made, "wind")) == {MIRRORED, EXCHANGED}
+    assert set(placebos(made, "wind")) == {MIRRORED, EXCHANGED, SHIFTED}
+    assert set(placebos(made, "wind", (MIRRORED, EXCHANGED))) == {MIRRORED, EXCHANGED}
     # Twice the same manoeuvre: the other log's heading is its own.
-    assert set(placebos(replace(made, members=(first, first)), "wind")) == {MIRRORED}
+    assert set(placebos(replace(made, members=(first, first)), "wind")) == {MIRRORED, SHIFTED}
     eta = first.windows.measurements.eta.copy()
     eta[:, 2] = 0.1
     straight = replace(first, windows=replace(first.windows, measurements=replace(first.windows.measurements, eta=eta)))
@@ -306,9 +308,14 @@ def test_like_headings_make_no_placebo() -> None:
     # Two circles the same way round: the other's heading is the log's own, but for an angle; one the other way round is not.
     turning = (0.2 * t for t in (first.windows.measurements.t,) * 2)
     circles = [_headed(first, psi + at) for psi, at in zip(turning, (0.0, 2.0), strict=True)]
-    assert set(placebos(replace(made, members=tuple(circles)), "wind")) == {MIRRORED}
+    assert set(placebos(replace(made, members=tuple(circles)), "wind", (MIRRORED, EXCHANGED))) == {MIRRORED}
+    # Nor is that of a log that turns a whole number of times another half of the log later.
+    t = first.windows.measurements.t
+    whole = _headed(first, 2.0 * np.pi * 3.0 * t / (t[-1] + t[1] - t[0]))
+    assert set(placebos(replace(made, members=(whole, whole)), "wind")) == {MIRRORED}
     other = _headed(first, -0.2 * first.windows.measurements.t)
-    assert set(placebos(replace(made, members=(circles[0], other)), "wind")) == {MIRRORED, EXCHANGED}
+    turned = placebos(replace(made, members=(circles[0], other)), "wind", (MIRRORED, EXCHANGED))
+    assert set(turned) == {MIRRORED, EXCHANGED}
 
 
 def _headed(member: Member, psi: Floats) -> Member:
