@@ -20,7 +20,7 @@ from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
 from ferryid.report import diagnosis_figures
-from ferryid.report.diagnosis_words import numbers, probability
+from ferryid.report.diagnosis_words import numbers, probability, title
 from ferryid.types import IN_MEMORY
 from ferryid.vessel import load_profile
 from tests.evidence import stamp
@@ -118,9 +118,30 @@ def told(
         for k, (says, sure, word) in enumerate(rows):
             first = f"{one.log} | {one.verdict}" if k == 0 else " | "
             lines.append(f"| {first} | {says} | {sure} | {word} |")
-    lines += ["", *_notes(made)]
+    judged = [(finding, judge(one, finding)) for one in made for finding in one.findings]
+    lines += ["", tally(judged), "", *_notes(made)]
     lines += _figures(vessel + "-together" * (len(logs) > 1 and not each), made)
     return "\n".join(lines), made
+
+
+def tally(judged: Sequence[tuple[Finding, str]]) -> str:
+    """Return how many findings above one half are defended, and which are not: the aim is all of them."""
+    sure = [(finding, word) for finding, word in judged if finding.sure]
+    if not sure:
+        return "Findings above one half: none."
+    defended, others = 0, dict[str, int]()
+    for finding, word in sure:
+        if "Defended" in word and "Doubtful" not in word:
+            defended += 1
+            continue
+        kind = "doubtful" if "Doubtful" in word else "no witness"
+        name = f"{title(finding.effect, finding.instance)}: {kind}"
+        others[name] = others.get(name, 0) + 1
+    listing = "; ".join(f"{name}{f' ({count} logs)' if count > 1 else ''}" for name, count in others.items())
+    return (
+        f"Findings above one half: {len(sure)}, of which {defended} are defended (aim: all, or not made)"
+        f"{f'. The others: {listing}' if others else ''}."
+    )
 
 
 def _notes(made: Sequence[Diagnosis]) -> list[str]:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
+from ferryid.diagnose.judging.finding import Finding
 from tests.real import diagnoses
 
 PAGE = """# Diagnoses
@@ -42,3 +45,19 @@ def test_figures_of_findings_that_are_no_longer_made_are_removed(
     kept[1] = "diagnosis-ferry-lag.svg"
     assert sorted(one.name for one in tmp_path.iterdir()) == sorted(kept)
     assert "Made in 3 minutes." in (tmp_path / "diagnosis.md").read_text(encoding="utf-8")
+
+
+def test_findings_above_one_half_are_counted_with_those_that_nothing_defends() -> None:
+    def finding(effect: str, sure: bool = True) -> Finding:
+        return cast(Finding, SimpleNamespace(effect=effect, instance=None, sure=sure))
+
+    assert diagnoses.tally([(finding("wind", sure=False), "Defended: so.")]) == "Findings above one half: none."
+    judged = [
+        (finding("wind"), "Defended: the witness says 1 m/s. Defended: the witness says 2 m/s."),
+        (finding("wind"), "Defended: the witness says 1 m/s. Doubtful: the witness says 9 m/s."),
+        (finding("payload"), diagnoses.UNJUDGED),
+        (finding("payload"), diagnoses.UNJUDGED),
+    ]
+    told = diagnoses.tally(judged)
+    assert told.startswith("Findings above one half: 4, of which 1 are defended")
+    assert told.endswith("The others: Steady wind: doubtful; Payload: no witness (2 logs).")
