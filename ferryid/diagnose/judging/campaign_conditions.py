@@ -32,6 +32,7 @@ from ferryid.diagnose.judging.campaign_errors import LogErrors
 from ferryid.diagnose.judging.campaign_evidence import (
     EXCHANGED,
     MIRRORED,
+    SHIFTED,
     Gain,
     HeldOutLoss,
     held_out_loss,
@@ -68,12 +69,15 @@ class PlaceboTest:
         both gain by that. A hull that is known leaves no such part, and it is zero.
     imitated
         What the share would be if the condition were what acts: see `imitated_share`.
+    surely
+        Whether held-out stretches must favour the condition by an interval that excludes zero, and not only on the whole.
     """
 
     gain: Gain
     evidence: float
     share: float
     imitated: float = 0.0
+    surely: bool = True
 
     @property
     def own(self) -> bool:
@@ -87,7 +91,8 @@ class PlaceboTest:
     def beaten(self) -> bool:
         """True where evidence and held-out data surely speak for the condition, and most of what it explains is its own."""
         odds = self.evidence / INFERENCE.posterior_factor**2
-        return self.gain.low > 0.0 and odds >= JUDGING.placebo_evidence and self.own
+        least = self.gain.low if self.surely else self.gain.total
+        return least > 0.0 and odds >= JUDGING.placebo_evidence and self.own
 
 
 @dataclass(frozen=True)
@@ -278,6 +283,9 @@ def judge_conditions(
     tests.sort(key=lambda one: -one.evidence)
     confirmed = [one for one in tests if one.confirmed]
     if not confirmed:
+        pair = _hidden_by_each_other(campaign, tests, progress, bare)
+        if pair:
+            return JudgedConditions(CommonHull(pair[0].fit, place), pair)
         progress("estimating one hull for all logs")
         return JudgedConditions(CommonHull(estimate_campaign(without_conditions(campaign)), place), tuple(tests))
     best = confirmed[0]
@@ -320,6 +328,27 @@ def judge_conditions(
     return JudgedConditions(CommonHull(best.fit, place), tuple(seen_beside.get(one.effect, one) for one in left))
 
 
+def _hidden_by_each_other(
+    campaign: Campaign, tests: Sequence[ConditionTest], progress: Callable[[str], None], bare: CampaignFit
+) -> tuple[ConditionTest, ...]:
+    """Return the tests of conditions beside each other where all hold there, though none does by itself; else none.
+
+    What one leaves to explain may make an axis worse with the other alone, while the evidence speaks for either.
+    """
+    likely = [one for one in tests if one.evidence >= INFERENCE.prior_odds and one.placebos]
+    if len(likely) < 2:
+        return ()
+    progress("estimating conditions beside each other that do not hold by themselves")
+    fit = estimate_campaign(with_conditions(campaign, frozenset(one.effect for one in likely)), bare=bare)
+    found = []
+    for one in likely:
+        test = _tested(fit.campaign, one.effect, progress, bare, made=fit)
+        if not test.confirmed:
+            return ()
+        found.append(replace(test, alone=one.evidence))
+    return tuple(found)
+
+
 def _beside(fit: CampaignFit, both: Campaign, bare: CampaignFit) -> CampaignFit | None:
     """Return the logs with one more condition than a fit has; None where that is not seen beside what it has."""
     made = estimate_campaign(both, bare=bare)
@@ -356,7 +385,9 @@ def _tested(
         if not campaign.hull.known:
             share = (other.evidence - none.evidence) / evidence
             like = imitated_share(made, none, other, test.rows)
-        against[name] = PlaceboTest(Gain.of(over), made.evidence - other.evidence, share, like)
+        # Of three placebos that all must do worse beyond chance, one would too often not.
+        surely = name != SHIFTED
+        against[name] = PlaceboTest(Gain.of(over), made.evidence - other.evidence, share, like, surely)
     return replace(test, placebos=against)
 
 

@@ -367,3 +367,37 @@ def test_how_far_logs_disagree_is_said_as_people_think_of_it(variances: float, t
     assert says.startswith("The hull is that of 2 other logs of the vessel")
     assert told in says
     assert "variance" not in says
+
+
+def test_conditions_that_hide_each_other_are_confirmed_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither holds by itself, and each does beside the other; where one does not there, none is confirmed."""
+    both = campaign(conditions=("wind", "current"))
+    fit = estimate_campaign(both)
+    held = PlaceboTest(Gain(30.0, 10.0, 60.0), 99.0, 0.0)
+    worse = Gain(3.0, -1.0, 7.0)
+
+    def judged(fails: str = "", placebos: dict[str, PlaceboTest] | None = None) -> list[tuple[str, bool, bool]]:
+        def tested(one: Campaign, name: str, *_: object, **__: object) -> ConditionTest:
+            alone = len(one.conditions) == 1
+            gain = worse if alone or name == fails else Gain(30.0, 10.0, 60.0)
+            loss = cast(tuple[object, object], (None, None))
+            against = {"a": held} if placebos is None else placebos
+            return ConditionTest(name, fit, fit, loss, 50.0, gain, against)  # type: ignore[arg-type]
+
+        monkeypatch.setattr(campaign_conditions, "_tested", tested)
+        monkeypatch.setattr(campaign_conditions, "_improvement", lambda _: np.zeros(3))
+        monkeypatch.setattr(campaign_conditions, "unfelt", lambda _: "")
+        found = judge_conditions(both, {"a": 0, "b": 1, "c": 2}, no_progress)
+        return [(one.effect, one.confirmed, one.alone is not None) for one in found.tests]
+
+    assert sorted(judged()) == [("current", True, True), ("wind", True, True)]
+    assert all(not confirmed for _, confirmed, _ in judged(fails="wind"))
+    # Without a placebo by itself it is not tried.
+    assert all(not confirmed for _, confirmed, _ in judged(placebos={}))
+
+
+def test_the_heading_at_other_times_needs_to_do_worse_on_the_whole_only() -> None:
+    gain = Gain(30.0, -25.0, 79.0)
+    assert PlaceboTest(gain, 99.0, 0.0, surely=False).beaten
+    assert not PlaceboTest(Gain(-1.0, -25.0, 20.0), 99.0, 0.0, surely=False).beaten
+    assert not PlaceboTest(gain, 0.1, 0.0, surely=False).beaten
