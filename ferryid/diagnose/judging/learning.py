@@ -51,8 +51,8 @@ class Learned:
     ratio
         Held-out squared prediction error with it over that without it, by axis; NaN where it is not known.
     over_fit
-        That of the model that is stored over that of ``ferryid fit`` alone, by axis; empty where it is the model of the fit, or
-        none.
+        That of the model that is stored over that of ``ferryid fit`` alone, by axis; 1 where that takes the place of one with
+        findings, empty where nothing was named, or nothing learned.
     with_hints
         True where effects of whose name the diagnosis is in doubt are in the model, as predictions with them are better.
     fit_alone
