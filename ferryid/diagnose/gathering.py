@@ -181,7 +181,8 @@ def _unset(paths: Sequence[str]) -> tuple[str, ...]:
         return ()
     return (
         f"The clock was not set in {listed([Path(one).name for one in paths])}, whose times are before the year 2000: when "
-        "they were recorded is not known, and all logs are taken in the order in which they were given.",
+        "they were recorded is not known, all logs are taken in the order in which they were given, and none is taken to be "
+        "near another in time.",
     )
 
 

@@ -378,10 +378,11 @@ class _Problem:
         L = len(self.windows)
         wind, covariance = np.zeros((L, 2)), np.zeros((L, 2, 2))
         places = some_logs([len(one) for one in self.windows])
+        begun = True
         if len(places) == L:
             self._step({}, wind)
         else:
-            self._begin_as(places, loads)
+            begun = self._begin_as(places, loads)
         for k, load in loads.items():
             wind[k] = self._start(k, load)
         for _ in range(IDENTIFY.condition_steps):
@@ -389,16 +390,17 @@ class _Problem:
             covariance = self._step(loads, wind)
             moved = np.abs(self._hull() - hull) / np.sqrt(np.maximum(np.diag(self.inverse), 1e-300))
             if np.abs(wind - before).max() < 1e-3 or (self.settled and moved.max() < IDENTIFY.settled_step):
-                self.converged = True
+                # Spreads that some logs did not settle on are not settled for all of them.
+                self.converged = begun
                 break
         missing = [k for k in range(L) if k not in loads]
         wind[missing], covariance[missing] = np.nan, np.nan
         return wind, covariance
 
-    def _begin_as(self, places: Sequence[int], loads: Mapping[int, Load]) -> None:
+    def _begin_as(self, places: Sequence[int], loads: Mapping[int, Load]) -> bool:
         """Begin with the hull of some of the logs, and keep the spreads and the noise that were found with it.
 
-        They take most of the steps, and some logs tell them as well as all.
+        They take most of the steps, and some logs tell them as well as all. Returns whether they settled.
         """
         self.settled = True
         some = _Problem([self.windows[k] for k in places], *self._of)
@@ -406,6 +408,7 @@ class _Problem:
         for name in ("gains", "intercept", "sigma", "noise", "factor", "offset_spread", "wind_spread", "force_spread"):
             setattr(self, name, getattr(some, name))
         self.gusts.spread = some.gusts.spread
+        return some.converged
 
     def _start(self, k: int, load: Load) -> Floats:
         """Return the likeliest wind of a log for the hull found so far, of some directions and speeds."""

@@ -325,14 +325,15 @@ def _free_run_figures(diagnosis: Diagnosis, prefix: str, drawings: Drawings) -> 
     before, after = diagnosis.before.get("free_run", {}), diagnosis.after.get("free_run", {})
     if not (before.get("horizons_s") and after.get("horizons_s") and diagnosis.findings):
         return []
-    file = f"{prefix}free-run-errors"
+    file, learned = f"{prefix}free-run-errors", diagnosis.learned
+    other = "; it is not the one that is stored" if learned is not None and learned.fit_alone else ""
     return [
         {
             "file": file,
             "svg": drawings.of(file, figures.free_run_errors, _free_run(before), _free_run(after)),
             "caption": f"Root-mean-square error of {counted(before.get('starts', 0), 'free run')} on "
             "held-out data: each takes the "
-            "measured state once and then only the measured actuator forces. New model: with the findings.",
+            f"measured state once and then only the measured actuator forces. New model: with the findings{other}.",
         }
     ]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -102,8 +101,9 @@ def test_an_archive_of_such_logs_is_reduced_too(ferryid, tmp_path: Path) -> None
     assert ferryid("ingest", log, "--vessel", vessel, *out).code == 0
     run = ferryid("fit", "--archive", "--vessel", vessel, "--components", "6", "--no-report", *out, "--json", "-")
     assert run.code == 0, run.err
-    result = json.loads(run.out)
+    result = conforms(run.out)
     assert result["scores"]["per_axis"]["sway"] is None
+    conforms(Path(result["model"]["path"]).read_text("utf-8"))
     model = load_file(Path(result["model"]["path"]))
     assert not model.theta[:, 1].any()
     assert model.theta[:, [0, 2]].any()

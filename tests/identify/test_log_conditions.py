@@ -268,3 +268,19 @@ def test_winds_that_drift_with_steady_forces_are_not_given(
     assert data.conditions.indistinct == told
     assert ["cannot be distinguished" in one for one in data.condition_notes] == [True] * told
     assert data.conditions.load[0].any() != told
+
+
+@pytest.mark.parametrize("settled", [True, False])
+def test_winds_of_many_logs_settle_where_those_of_some_do(monkeypatch: pytest.MonkeyPatch, settled: bool) -> None:
+    monkeypatch.setattr("ferryid.identify.some_logs.IDENTIFY", replace(IDENTIFY, sample_logs=3, sample_windows=1))
+    solve = log_conditions._Problem.solve
+
+    def solved(self: log_conditions._Problem, loads: Any) -> tuple[Floats, Floats]:
+        found = solve(self, loads)
+        if len(self.windows) == 3:
+            self.converged, self.force_spread = self.converged and settled, 1.1 * IDENTIFY.most_steady_force
+        return found
+
+    monkeypatch.setattr(log_conditions._Problem, "solve", solved)
+    data = data_of([measured(k, seconds=300.0, jitter=0.01, noise=4.0, force=blown) for k in range(6)])
+    assert data.conditions.indistinct != settled

@@ -51,8 +51,8 @@ class Learned:
     ratio
         Held-out squared prediction error with it over that without it, by axis; NaN where it is not known.
     over_fit
-        That of the model that is stored over that of ``ferryid fit`` alone, by axis; empty where it is the model of the fit, or
-        none.
+        That of the model that is stored over that of ``ferryid fit`` alone, by axis; 1 where that takes the place of one with
+        findings, empty where nothing was named, or nothing learned.
     with_hints
         True where effects of whose name the diagnosis is in doubt are in the model, as predictions with them are better.
     fit_alone
@@ -178,7 +178,7 @@ class Learner:
         compared = [start, beside, plain.judged, unseen, found.judged]
         base, without, fitted, bare, after = self._errors(compared, rows)
         verdict, change = _judged(found.outcome, bare, after), _over(after, without)
-        worse = plain.acceptance.accepted and accept(after, fitted, "prediction").accepted
+        worse = self.start is None and plain.acceptance.accepted and accept(after, fitted, "prediction").accepted
         if worse or not (verdict.accepted and accept(without, after, "prediction").accepted):
             return model, learned
         if self.start is not None or self.profile.hull.has_model:
@@ -245,7 +245,9 @@ class Learner:
         if verdict.accepted:
             stored = replace(found.model, accepted=True, scores=_scores(before, after, found.outcome))
         over_fit = _over(best, fitted)
-        if stored is not None and plain.acceptance.accepted and accept(best, fitted, "prediction").accepted:
+        # A model that was examined knows other logs, which a fit to these alone would forget.
+        of_these = stored is not None and self.start is None and plain.acceptance.accepted
+        if of_these and accept(best, fitted, "prediction").accepted:
             return self._instead(base.name, known, best, fitted)
         said = _says(what, by_axis(_over(after, known)), verdict, "the model without it")
         if plain.acceptance.accepted and _fit_is_better(best, fitted):
@@ -256,7 +258,7 @@ class Learner:
         return stored, Learned(verdict.accepted, said, verdict.reasons, by_axis(_over(after, known)), by_axis(over_fit))
 
     def _instead(self, name: str, known: Floats, best: Floats, fitted: Floats) -> tuple[Model, Learned]:
-        """Return the model of the fit alone, which predicts better than any on what is diagnosed or examined."""
+        """Return the model of the fit alone, which predicts better than any on what is diagnosed."""
         plain, over_fit = self._plain.outcome, _over(fitted, fitted)
         times = float(np.mean(_over(best, fitted)))
         said = (

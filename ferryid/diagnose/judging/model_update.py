@@ -66,17 +66,21 @@ def store_updated_model(
     if learner is not None:
         wide = [replace(one, posterior=one.wider or one.posterior) for one in diagnoses]
         wider, more = update_model(wide, profile, model, name) if wide != list(diagnoses) else (None, ())
+        diagnosed = made
         made, learned = learner.learn(made, name, wider)
         if learned.with_hints:
-            diagnoses, notes = wide, more
+            diagnosed, diagnoses, notes = wider, wide, more
+        if made is not None and diagnosed is not None:
+            # The model of a fit has nothing of the diagnosis in it, and masses may be others with what was learned on top.
+            doubts = () if learned.fit_alone else _doubts(made, diagnoses, profile)
+            made = replace(made, accepted=made.accepted and not doubts)
+            before = _doubts(diagnosed, diagnoses, profile)
+            notes = (*(one for one in notes if one not in before), *doubts)
         notes = (*notes, learned.says)
         diagnoses = [replace(one, learned=learned) for one in diagnoses]
         if made is not None and not (learned.accepted or made.hull or made.terms or profile.hull.has_model):
             # Effects without a hull predict nothing.
             made = None
-    if made is not None and any(one.posterior is not None and one.posterior.doubt for one in diagnoses):
-        # Whatever was learned on top.
-        made = replace(made, accepted=False)
     if made is not None and made.scores is None:
         # Neither the diagnoses nor a fit could judge it.
         made = None
@@ -125,12 +129,18 @@ def update_model(
         vessel_effects=_composed(start.vessel_effects, vessel, profile),
         conditions=_added(start.conditions, logs),
     )
-    doubts = [f"{one.doubt[:1].upper()}{one.doubt[1:]}." for one in logs if one.doubt]
+    doubts = _doubts(made, diagnoses, profile)
+    return replace(made, accepted=made.accepted and not doubts), (*notes, *doubts)
+
+
+def _doubts(made: Model, diagnoses: Sequence[Diagnosis], profile: Profile) -> tuple[str, ...]:
+    """Return why a model that diagnoses lead to does not become the current one, as notes."""
+    found = [one.posterior.doubt for one in diagnoses if one.posterior is not None and one.posterior.doubt]
+    found = [f"{one[:1].upper()}{one[1:]}." for one in found]
     if made.hull:
         # A fit refuses such masses.
-        doubts += impossible_masses(profile, ModelForces(made).altered_hull())
-    notes += tuple(f"The model does not become the current one. {one}" for one in dict.fromkeys(doubts))
-    return replace(made, accepted=made.accepted and not doubts), notes
+        found += impossible_masses(profile, ModelForces(made).altered_hull())
+    return tuple(f"The model does not become the current one. {one}" for one in dict.fromkeys(found))
 
 
 def _refitted(logs: Sequence[HullPosterior], model: Model | None) -> dict[str, Quantity]:

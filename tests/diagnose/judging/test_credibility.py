@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -29,7 +31,8 @@ from ferryid.diagnose.judging.credibility import (
 )
 from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.diagnose.judging.group_differences import Difference, _doubt
-from ferryid.diagnose.judging.model_update import update_model
+from ferryid.diagnose.judging.learning import Learned, Learner
+from ferryid.diagnose.judging.model_update import store_updated_model, update_model
 from ferryid.diagnose.judging.posterior import HullPosterior, Posterior
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
@@ -368,3 +371,32 @@ def test_a_model_of_what_cannot_be_does_not_become_the_current_one() -> None:
         assert made is not None
         assert not made.accepted
         assert notes[-1].startswith(f"The model does not become the current one. {why}")
+
+
+@pytest.mark.parametrize(
+    ("light", "doubt", "fit_alone", "current"),
+    [
+        (False, "", False, True),
+        (False, "beside it, Y_v moves far", False, False),
+        # The fit's model knows nothing of a hull that is doubtful.
+        (False, "beside it, Y_v moves far", True, True),
+        (True, "", True, True),
+        # The masses of what is stored count, with what was learned on top.
+        (True, "", False, True),
+    ],
+)
+def test_what_is_learned_becomes_the_current_model_unless_a_doubt_holds_for_it(
+    tmp_path: Path, light: bool, doubt: str, fit_alone: bool, current: bool
+) -> None:
+    hull = HULL * np.where(np.array(COEFFICIENTS) == "m11", 0.05 if light else 1.0, 1.0)
+    (possible, _), (asked, _) = (update_model([taught(one)], FERRY, None, "boat") for one in (HULL, hull))
+    assert possible is not None
+    assert asked is not None
+    assert asked.accepted != light
+    learned = replace(possible, accepted=True)
+    told = Learned(True, "Learned.", fit_alone=fit_alone)
+    learner = cast(Learner, SimpleNamespace(learn=lambda *_: (learned, told)))
+    (done,) = store_updated_model([taught(hull, doubt)], FERRY, None, tmp_path, learner=learner)
+    assert done.model is not None
+    assert json.loads(Path(done.model).read_text("utf-8"))["accepted"] == current
+    assert any("does not become the current one" in one for one in done.notes) != current

@@ -351,22 +351,55 @@ def test_withheld_signals_are_not_learned_from() -> None:
 
 
 @pytest.mark.parametrize(
-    ("folds", "first", "second", "fitted", "kept", "told"),
+    ("folds", "first", "second", "fitted", "examined", "kept", "told"),
     [
         # Better on top than without, and than the fit.
-        (0.8, 60.0, 50.0, 70.0, "first", "on top of the findings is part of the model"),
+        (0.8, 60.0, 50.0, 70.0, False, "first", "on top of the findings is part of the model"),
         # The fit is better, and so is the correction on the hull as it was.
-        (0.8, 80.0, 50.0, 50.0, "second", "on the hull as it was before the diagnosis is part of the model"),
+        (0.8, 80.0, 50.0, 50.0, False, "second", "on the hull as it was before the diagnosis is part of the model"),
         # The fit is better than either, and takes their place.
-        (0.8, 80.0, 90.0, 40.0, "fit", "The model of ferryid fit, which knows no findings, .* 2.00 times as large"),
+        (
+            0.8,
+            80.0,
+            90.0,
+            40.0,
+            False,
+            "fit",
+            "The model of ferryid fit, which knows no findings, .* 2.00 times as large",
+        ),
+        # It is told of, where a model was examined that knows other logs.
+        (
+            0.8,
+            80.0,
+            90.0,
+            40.0,
+            True,
+            "first",
+            "The model of ferryid fit predicts these logs better: .* 2.00 times as large",
+        ),
         # It is better by less than what a model is accepted for: told.
-        (0.8, 80.0, 90.0, 77.0, "first", "The model of ferryid fit predicts these logs better: .* 1.04 times as large"),
+        (
+            0.8,
+            80.0,
+            90.0,
+            77.0,
+            False,
+            "first",
+            "The model of ferryid fit predicts these logs better: .* 1.04 times as large",
+        ),
         # What folds speak against is not stored, whatever the held-out rows say.
-        (1.1, 60.0, 50.0, 99.0, "none", "on folds of the training rows .* 1.10 times as large"),
+        (1.1, 60.0, 50.0, 99.0, False, "none", "on folds of the training rows .* 1.10 times as large"),
     ],
 )
 def test_which_correction_is_stored(
-    monkeypatch: pytest.MonkeyPatch, folds: float, first: float, second: float, fitted: float, kept: str, told: str
+    monkeypatch: pytest.MonkeyPatch,
+    folds: float,
+    first: float,
+    second: float,
+    fitted: float,
+    examined: bool,
+    kept: str,
+    told: str,
 ) -> None:
     """Held-out errors are 100 without a correction, `first` with it, `second` with that on the hull as it was."""
     diagnosed = replace(blank_model(FERRY, "ferry"), hull=hull_of_ferry())
@@ -398,7 +431,8 @@ def test_which_correction_is_stored(
     monkeypatch.setattr(Learner, "_plain", property(fit))
     monkeypatch.setattr(Learner, "_remainder", remainder)
     monkeypatch.setattr(Learner, "_errors", measured)
-    stored, learned = Learner(("log",), FERRY, None, RunContext(Path("nowhere"))).learn(diagnosed, "ferry")
+    start = blank_model(FERRY, "ferry") if examined else None
+    stored, learned = Learner(("log",), FERRY, start, RunContext(Path("nowhere"))).learn(diagnosed, "ferry")
     assert stored is not None
     assert stored.settings.get("test", "none") == kept
     assert learned.accepted == stored.accepted == (kept != "none")
