@@ -64,8 +64,14 @@ def title(effect: str, instance: str | None = None) -> str:
     return titled(name, instance)
 
 
+UNRECORDED = "unrecorded_force"
+"""A force that the records of the actuators lack: no fault of a sensor, and nothing that could be corrected."""
 APART = 0.1
 """Share of the squared force error by which a finding alone may remove more than all do, before the headline says why."""
+
+
+def _of_sensor(finding: Finding) -> bool:
+    return finding.effect not in effects() and finding.effect != UNRECORDED
 
 
 def headline(diagnosis: Diagnosis) -> str:
@@ -74,11 +80,12 @@ def headline(diagnosis: Diagnosis) -> str:
     named = [one for one in every if one.sure]
     doubtful = listed([_inline(title(one.effect, one.instance)) for one in every if one not in named])
     physics = [_sure_name(one) for one in named if one.effect in effects()]
-    sensors = [_inline(title(one.effect)) for one in named if one.effect not in effects()]
+    sensors = [_inline(title(one.effect)) for one in named if _of_sensor(one)]
     base = "simulation" if diagnosis.against else "model"
     left_out = "the recording differs from the simulation in" if diagnosis.against else "the model left out"
     parts = [f"{left_out} {listed(physics)}"] if physics else []
     parts += [f"the sensors have faults, corrected here: {listed(sensors)}"] if sensors else []
+    parts += ["a force acted that was not recorded"] if any(one.effect == UNRECORDED for one in named) else []
     names = "; ".join(parts) + (f"; perhaps also {doubtful}" if doubtful else "")
     removed = {axis: 1.0 - ratio.value for axis, ratio in ratio_of(diagnosis).items()}
     change = changed(removed)
@@ -380,7 +387,8 @@ def summary(diagnoses: Sequence[Diagnosis]) -> str:
     named = [one for one in every if one.effect != UNKNOWN]
     # Sizes differ from log to log.
     sure = list(dict.fromkeys(_sure_name(one, sizes=False) for one in named if one.sure and one.effect in effects()))
-    sensors = dict.fromkeys(_sure_name(one, sizes=False) for one in named if one.sure and one.effect not in effects())
+    sensors = dict.fromkeys(_sure_name(one, sizes=False) for one in named if one.sure and _of_sensor(one))
+    unrecorded = sum(any(one.sure and one.effect == UNRECORDED for one in each.findings) for each in diagnoses)
     doubtful = dict.fromkeys(_inline(title(one.effect, one.instance)) for one in named if not one.sure)
     known = {_inline(name) for one in named if one.sure for name in _called(one)}
     perhaps = [one for one in doubtful if one not in known]
@@ -389,6 +397,8 @@ def summary(diagnoses: Sequence[Diagnosis]) -> str:
         parts.append(f"The model left out {listed(sure)}.")
     if sensors:
         parts.append(f"The sensors have faults, corrected here: {listed(list(sensors))}.")
+    if unrecorded:
+        parts.append(f"In {unrecorded} of them a force acted that was not recorded.")
     if perhaps:
         parts.append(f"Perhaps the model {'also ' if sure else ''}left out {listed(perhaps)}.")
     if len(named) < len(every):

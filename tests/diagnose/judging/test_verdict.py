@@ -16,7 +16,7 @@ from ferryid.diagnose.judging.finding import UNKNOWN, Finding
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.judging.verdict import VERDICTS, Remainder, campaign_verdict, verdict_of, worse_axes
 from ferryid.effects import effects
-from ferryid.report.diagnosis_words import headline, summary, title
+from ferryid.report.diagnosis_words import UNRECORDED, headline, summary, title
 from ferryid.types import AXES
 from tests.diagnose.judging.findings import found
 
@@ -168,7 +168,9 @@ def test_no_sentence_on_several_logs_contradicts_them(logs: list[Diagnosis]) -> 
     named = [one for one in every if one.sure and one.effect != UNKNOWN]
     assert (verdict in ("explained", "partly_explained")) == bool(named)
     assert ("The model left out" in says) == any(one.effect in effects() for one in named)
-    assert ("The sensors have faults" in says) == any(one.effect not in effects() for one in named)
+    apart = {UNRECORDED, *effects()}
+    assert ("The sensors have faults" in says) == any(one.effect not in apart for one in named)
+    assert ("a force acted that was not recorded" in says) == any(one.effect == UNRECORDED for one in named)
     if verdict == "explained":
         assert {one.verdict for one in logs} <= {"explained", "matched", "not_testable"}
     for name, hints in ((title(one.effect), not one.sure) for one in every if one.effect != UNKNOWN):
@@ -226,3 +228,11 @@ def test_enumerated_figures_never_explain_what_they_leave() -> None:
         whole = testable and not eliminated and value < 1.2 and left < JUDGING.unexplained_share
         expected = whole and findings in ((SURE,), (SENSOR,))
         assert (verdict_of(findings, remainder) == "explained") == expected
+
+
+def test_a_force_that_was_not_recorded_is_no_fault_of_a_sensor() -> None:
+    pushed = found(UNRECORDED)
+    one = Diagnosis("log", "ferry", verdict_of((pushed,), Remainder(testable=False)), (pushed,), {}, {})
+    one = replace(one, remainder=Remainder(testable=False))
+    assert headline(one).startswith("Partly explained: a force acted that was not recorded.")
+    assert "In 2 of them a force acted that was not recorded." in summary([one, replace(one, log="other")])
