@@ -20,6 +20,7 @@ from ferryid.identify.pipeline import estimator_for
 from ferryid.identify.rows import basis_for
 from ferryid.identify.settings import FOLDS, TEST_WINDOW_S, WINDOWS_S, FitSettings
 from ferryid.identify.split import TooShort
+from ferryid.identify.sweeps.swept import Swept
 from ferryid.identify.sweeps.weak_sweep import sweep_weak
 from ferryid.regression.bases import Basis
 from ferryid.regression.cross_validation import Folds
@@ -41,7 +42,7 @@ BY = {"blocks": "contiguous stretches of every log", "logs": "whole logs"}
 
 
 @dataclass(frozen=True)
-class Sweep:
+class Sweep(Swept):
     """What a sweep found.
 
     Attributes
@@ -50,47 +51,20 @@ class Sweep:
         One of `KINDS`.
     vessel, logs
         Name of the vessel; of each log its name, SHA-256, seconds, rows and warnings.
-    settings
-        How was fitted; its basis is the one that all logs allow.
     windows_s
         Windows that were tried [s].
     by
         Cross-validation by contiguous stretches of every log (``"blocks"``) and, of several logs, by whole ones (``"logs"``).
     notes
         What a reader must know, as sentences.
-    test_window_s
-        Smoothing window of the test rows [s], or in the weak form the length of the windows that are tested in.
-    asked, estimator_says, estimators
-        The estimator that was asked for; of ``"auto"`` a sentence that says which one was swept and why, and how well either
-        predicts, where both were compared.
     """
 
     what: str
     vessel: str
     logs: tuple[Mapping[str, Any], ...]
-    settings: FitSettings
     windows_s: tuple[float, ...]
     by: Mapping[str, Selection]
     notes: tuple[str, ...]
-    test_window_s: float = TEST_WINDOW_S
-    asked: str = "derivative"
-    estimator_says: str = ""
-    estimators: tuple[EstimatorScore, ...] = ()
-
-    @property
-    def weak(self) -> bool:
-        """Whether settings of the weak form were swept."""
-        return self.settings.estimator == "weak"
-
-    @property
-    def tested(self) -> str:
-        """What a fold tests: a row, or a window."""
-        return "overlapping window" if self.weak else "row"
-
-    @property
-    def error(self) -> str:
-        """What is compared."""
-        return "squared prediction error" if self.weak else "force MSE"
 
     @property
     def choice(self) -> Selection:
@@ -282,10 +256,10 @@ def _sweep_derivative(request: _Request) -> Sweep:
         what,
         profile.name,
         tuple(told),
-        replace(settings, basis=functions.name),
         windows,
         by,
         (*_notes(by, windows, settings), *log_warnings([(log["name"], log["warnings"]) for log in told])),
+        settings=replace(settings, basis=functions.name),
     )
 
 
@@ -311,11 +285,11 @@ def _sweep_weak(request: _Request) -> Sweep:
         what,
         profile.name,
         tuple(told),
-        replace(settings, basis=basis),
         lengths_s,
         by,
         (*notes, *_notes(by, lengths_s, settings), *log_warnings([(log["name"], log["warnings"]) for log in told])),
-        test_s,
+        settings=replace(settings, basis=basis),
+        test_window_s=test_s,
     )
 
 
@@ -393,8 +367,7 @@ def sweep_json(found: Sweep, report: str | None = None) -> dict[str, Any]:
         "by": {key: _choice_json(choice) for key, choice in found.by.items()},
         "choice": {"window_s": found.choice.window_s, "components": found.choice.components},
         "notes": list(found.notes),
-        "estimator": {"asked": found.asked, "swept": found.settings.estimator, "says": found.estimator_says},
-        "estimators": [one.to_json() for one in found.estimators],
+        **found.estimator_json(),
         "fit_options": list(found.fit_options),
         "report": report,
     }

@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.identify.outcome import EstimatorScore
-from ferryid.identify.settings import TEST_WINDOW_S, FitSettings
 from ferryid.identify.sweeps.settings_sweep import SCHEMA
+from ferryid.identify.sweeps.swept import Swept
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.regression.bases import Basis
 from ferryid.types import AXES, Flags, Floats, by_axis
@@ -114,12 +113,12 @@ class StructureComparison:
 
 
 @dataclass(frozen=True)
-class StructureSweep:
+class StructureSweep(Swept):
     """What a comparison of structures found.
 
     Attributes
     ----------
-    vessel, logs, settings
+    vessel, logs
         As in `ferryid.identify.sweeps.settings_sweep.Sweep`.
     block_s
         Least length of a block [s].
@@ -129,38 +128,14 @@ class StructureSweep:
         Bases that cannot be used here, and why.
     notes
         What a reader must know, as sentences.
-    asked, estimator_says, estimators
-        As in `ferryid.identify.sweeps.settings_sweep.Sweep`.
-    test_window_s
-        Window of the test rows, or length of the windows in which the weak form is judged [s].
     """
 
     vessel: str
     logs: tuple[Mapping[str, Any], ...]
-    settings: FitSettings
     block_s: float
     by: Mapping[str, StructureComparison]
     unusable: Mapping[str, str]
     notes: tuple[str, ...]
-    asked: str = "derivative"
-    estimator_says: str = ""
-    estimators: tuple[EstimatorScore, ...] = ()
-    test_window_s: float = TEST_WINDOW_S
-
-    @property
-    def weak(self) -> bool:
-        """True where the weak form was fitted."""
-        return self.settings.estimator == "weak"
-
-    @property
-    def tested(self) -> str:
-        """What a fold tests: a row, or a window."""
-        return "overlapping window" if self.weak else "row"
-
-    @property
-    def error(self) -> str:
-        """What is compared."""
-        return "squared prediction error" if self.weak else "MSE"
 
 
 def structures_json(found: StructureSweep, report: str | None = None) -> dict[str, Any]:
@@ -181,8 +156,7 @@ def structures_json(found: StructureSweep, report: str | None = None) -> dict[st
         "unusable": [{"basis": name, "reason": reason} for name, reason in found.unusable.items()],
         "choice": {"basis": chosen.basis, "structure": chosen.structure},
         "notes": list(found.notes),
-        "estimator": {"asked": found.asked, "swept": found.settings.estimator, "says": found.estimator_says},
-        "estimators": [one.to_json() for one in found.estimators],
+        **found.estimator_json(),
         "report": report,
     }
 

@@ -101,11 +101,11 @@ def sweep_structures(
     return StructureSweep(
         profile.name,
         told,
-        settings,
         block_s,
         by,
         unusable,
         (*_notes(by, settings), *log_warnings([(log["name"], log["warnings"]) for log in told])),
+        settings=settings,
         asked=asked,
         estimator_says=says,
         estimators=scores,
