@@ -47,7 +47,7 @@ def sweep(*windows_s: float) -> tuple[Sweep, Selection]:
     curves = Curves(mse, 0.1 * mse, np.array([20.0, 40.0, 0.0]), 5, 100, np.stack([mse] * 5, axis=1))
     choice = Selection(0, windows_s[0], 2, np.zeros(3, dtype=bool), curves)
     what = "both" if len(windows_s) > 1 else "components"
-    return Sweep(what, "ferry", (), FitSettings(), windows_s, {"blocks": choice}, ()), choice
+    return Sweep(what, "ferry", (), windows_s, {"blocks": choice}, (), settings=FitSettings()), choice
 
 
 def test_one_window_shows_every_axis_with_its_standard_error() -> None:
