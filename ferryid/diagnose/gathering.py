@@ -13,7 +13,7 @@ from ferryid.diagnose.checks.screening import screen_sensors, screen_together
 from ferryid.diagnose.data.measurements import measure_log
 from ferryid.diagnose.data.simulated import simulated
 from ferryid.diagnose.inference.campaign import assemble, repeated
-from ferryid.diagnose.inference.sessions import CLOCK_SET_NS, dated, start_ns
+from ferryid.diagnose.inference.sessions import dated, start_ns
 from ferryid.diagnose.inference.stages import AveragedLog, average
 from ferryid.diagnose.judging.campaign_split import Split, find_split
 from ferryid.diagnose.judging.diagnosis import distinct
@@ -171,7 +171,7 @@ def _simulated(log: AveragedLog) -> str:
 
 def _clocks(logs: Sequence[AveragedLog]) -> tuple[str, ...]:
     """Return sentences on clocks that some logs did not set, and on times that overlap: no vessel makes two logs at once."""
-    unset = [one.path for one in logs if start_ns(one) < CLOCK_SET_NS]
+    unset = [one.path for one in logs if not dated(one)]
     return (*(_unset(unset) if len(unset) < len(logs) else ()), *_overlapping(logs))
 
 
@@ -181,18 +181,14 @@ def _unset(paths: Sequence[str]) -> tuple[str, ...]:
         return ()
     return (
         f"The clock was not set in {listed([Path(one).name for one in paths])}, whose times are before the year 2000: when "
-        "they were recorded is not known, all logs are taken in the order in which they were given, and none is taken to be "
-        "near another in time.",
+        "they were recorded is not known, all logs are taken in the order in which they were given, and these are taken to be "
+        "near no other in time.",
     )
 
 
 def _overlapping(logs: Sequence[AveragedLog]) -> tuple[str, ...]:
     """Return a sentence on logs whose times overlap."""
-    spans = sorted(
-        (start, start + round(_seconds(one) * 1e9), one.path)
-        for one in logs
-        if (start := start_ns(one)) >= CLOCK_SET_NS
-    )
+    spans = sorted((start_ns(one), start_ns(one) + round(_seconds(one) * 1e9), one.path) for one in logs if dated(one))
     overlapping = []
     for k, (_, end, path) in enumerate(spans):
         for start, other_end, other in spans[k + 1 :]:
@@ -266,7 +262,7 @@ def whole(gathered: Gathered, profile: Profile, model: Model | None) -> Gathered
 
 def _in_time(logs: Sequence[AveragedLog]) -> list[AveragedLog]:
     """Return logs in order of time; in the order in which they were given where times are no dates."""
-    return sorted(logs, key=start_ns) if dated(logs) else list(logs)
+    return sorted(logs, key=start_ns) if all(dated(one) for one in logs) else list(logs)
 
 
 def _parted(group: Group, profile: Profile, model: Model | None) -> list[Group]:

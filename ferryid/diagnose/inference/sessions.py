@@ -16,23 +16,28 @@ def start_ns(log: AveragedLog) -> int:
     return log.screened.measured.survey.t0_ns
 
 
-def dated(logs: Sequence[AveragedLog]) -> bool:
-    """Return whether the times of all logs are dates."""
-    return all(start_ns(one) >= CLOCK_SET_NS for one in logs)
+def dated(log: AveragedLog) -> bool:
+    """Return whether the times of a log are dates."""
+    return start_ns(log) >= CLOCK_SET_NS
 
 
 def sessions(logs: Sequence[AveragedLog]) -> tuple[int, ...]:
-    """Return a number for each log, the same for logs of one session; empty where their times are no dates.
+    """Return a number for each log, the same for logs of one session; empty where the times of all of them are no dates.
 
-    A session ends where no log begins within `INFERENCE.session_gap_h` of the end of those before.
+    A session ends where no log begins within `INFERENCE.session_gap_h` of the end of those before. A log without a date is
+    near in time to no other, as far as is known: it is a session of its own.
     """
-    if not dated(logs):
+    placed = [i for i, one in enumerate(logs) if dated(one)]
+    if not placed:
         return ()
-    found, session, end = [0] * len(logs), -1, 0.0
-    for i in sorted(range(len(logs)), key=lambda i: start_ns(logs[i])):
+    found, session, end = [-1] * len(logs), -1, 0.0
+    for i in sorted(placed, key=lambda i: start_ns(logs[i])):
         start_h = start_ns(logs[i]) / 3.6e12
         if session < 0 or start_h - end > INFERENCE.session_gap_h:
             session, end = session + 1, start_h
         end = max(end, start_h + float(logs[i].windows.measurements.t[-1]) / 3600.0)
+        found[i] = session
+    for i in [i for i, one in enumerate(logs) if not dated(one)]:
+        session += 1
         found[i] = session
     return tuple(found)

@@ -279,7 +279,7 @@ def judge_conditions(
     for name in names:
         progress(f"estimating one hull and a {effects()[name].title.lower()} of every log")
         tests.append(_tested(with_conditions(campaign, frozenset([name])), name, progress, bare))
-    tests = [_against_others(one, campaign, progress, bare) if one.confirmed else one for one in tests]
+    tests = [_against_others(one, campaign, progress, bare) if one.confirmed or one.estimated else one for one in tests]
     tests.sort(key=lambda one: -one.evidence)
     confirmed = [one for one in tests if one.confirmed]
     if not confirmed:
@@ -503,21 +503,14 @@ def note(test: ConditionTest, place: Mapping[str, int]) -> str:
 
 
 def _where_worse(test: ConditionTest, place: Mapping[str, int]) -> str:
-    """Return where held-out stretches are predicted worse with a condition, if they surely are, and why they may be."""
+    """Return where held-out stretches are predicted worse with a condition, if they surely are."""
     if test.gain.high >= 0.0:
         return ""
     loss = test.loss[1]
     gains = loss.gain(test.loss[0])
     worst = min(place, key=lambda path: float(gains[loss.log == place[path]].sum()))
     lost = float(gains[loss.log == place[worst]].sum())
-    told = f" Those stretches are predicted worse with it, most in {Path(worst).name} ({lost:+.0f} nat)."
-    if np.count_nonzero(loss.log == place[worst]) == 1:
-        title = effects()[test.effect].title.lower()
-        told += (
-            f" It is so short that it is held out as a whole: its own {title} is not known then, and "
-            "all that follows from that counts as error, in squares of the noise."
-        )
-    return told
+    return f" Those stretches are predicted worse with it, most in {Path(worst).name} ({lost:+.0f} nat)."
 
 
 def _range(gain: Gain) -> str:

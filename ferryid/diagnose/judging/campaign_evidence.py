@@ -33,10 +33,12 @@ MIRRORED, EXCHANGED, SHIFTED = "the heading mirrored", "another log's heading", 
 
 @dataclass(frozen=True)
 class HeldOutLoss:
-    """Whitened squares of held-out blocks, shape (blocks,), the log of each, and the errors of every log's windows.
+    """Loss of held-out blocks, shape (blocks,), the log of each, and the errors of every log's windows.
 
-    What the rest cannot predict of a block shows no error; the squares of one of which it predicts nothing are NaN. The errors
-    are accelerations along the vessel's axes, shape (J, 3) for each log.
+    The loss is twice the negative logarithm of the density that the rest predicts of a block, but for a constant: squares of
+    its errors over the variance of noise and estimate together, and the logarithm of this variance. That of a block of which
+    the rest predicts nothing is NaN. The errors are accelerations along the vessel's axes, shape (J, 3) for each log; what
+    the rest cannot predict of a block shows none.
     """
 
     blocks: Floats
@@ -75,7 +77,7 @@ def held_out_loss(made: CampaignFit) -> HeldOutLoss:
     """Return what an estimate leaves of every block if it does not know this block and what overlaps with it."""
     lines = made.campaign.linearised(made.common, made.own)
     found = over(lambda i: _log_loss(made, i, *lines[i]), range(len(made.parts)))
-    log = np.repeat(np.arange(len(found)), [len(squares) for squares, _ in found])
+    log = np.repeat(np.arange(len(found)), [len(losses) for losses, _ in found])
     return HeldOutLoss(np.concatenate([one for one, _ in found]), log, tuple(errors for _, errors in found))
 
 
@@ -83,21 +85,29 @@ def _log_loss(made: CampaignFit, i: int, gaps: Floats, slopes: Floats) -> tuple[
     """Return `HeldOutLoss.blocks` and `errors` of a log, by its gaps and their slopes."""
     part, windows, errors = made.parts[i], made.campaign.members[i].windows, gaps.copy()
     C = made.covariance(i)
-    squares = []
+    losses = []
     for block, near in held_out_blocks(windows):
         J, w = part.slopes[near].reshape(-1, C.shape[0]), part.gaps[near].ravel()
         shares, along = np.linalg.eigh(np.eye(len(w)) - J @ C @ J.T)
         # A combination of the errors that this block alone determines is not predicted: the prior would be judged by it.
         predicted = shares >= JUDGING.least_predicted
         if not predicted.any():
-            squares.append(np.nan)
+            losses.append(np.nan)
             continue
-        along = along[:, predicted]
-        shift = C @ (J.T @ (along @ ((along.T @ w) / shares[predicted])))
-        left = part.gaps[block] + part.slopes[block] @ shift
-        squares.append(float(np.sum(left**2)))
+        along, known = along[:, predicted], shares[predicted]
+        taken = C @ (J.T @ along)
+        shift = taken @ ((along.T @ w) / known)
+        of_block = part.slopes[block].reshape(-1, C.shape[0])
+        left = part.gaps[block].ravel() + of_block @ shift
+        # What the rest does not know of the block, such as the wind of a log that is held out as a whole, is no error of it.
+        open_ = of_block @ taken
+        variance = np.eye(len(left)) + of_block @ C @ of_block.T + (open_ / known) @ open_.T
+        values, axes = np.linalg.eigh(variance)
+        # Noise alone makes one: less is rounding.
+        values = np.maximum(values, 1.0)
+        losses.append(float(np.sum((axes.T @ left) ** 2 / values) + np.sum(np.log(values))))
         errors[block] += slopes[block] @ shift
-    return np.array(squares), errors
+    return np.array(losses), errors
 
 
 def held_out_blocks(windows: Windows) -> Iterator[tuple[slice, slice]]:

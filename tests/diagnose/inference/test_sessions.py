@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit, estimate_campaign
+from ferryid.diagnose.inference.campaign_logs import Member
 from ferryid.diagnose.inference.campaign_model import Campaign, Spreads
 from ferryid.diagnose.inference.sessions import CLOCK_SET_NS, sessions
 from ferryid.diagnose.inference.thresholds import INFERENCE
+from ferryid.diagnose.judging.campaign_evidence import Gain, held_out_loss, without_conditions
 from ferryid.types import Floats
 from tests.diagnose.inference.test_campaign_estimation import WINDS, campaign
 
@@ -39,7 +41,11 @@ def test_a_session_ends_where_nothing_follows_for_hours() -> None:
 
 def test_times_that_are_no_dates_make_no_sessions() -> None:
     assert sessions([log(0.0, first_ns=0), log(24.0, first_ns=0)]) == ()
-    assert sessions([log(0.0), log(24.0, first_ns=0)]) == ()
+    assert sessions([]) == ()
+
+
+def test_a_log_without_a_date_is_near_no_other() -> None:
+    assert sessions([log(0.0), log(24.0, first_ns=0), log(0.5), log(0.5, first_ns=0), log(48.0)]) == (0, 2, 0, 3, 1)
 
 
 @pytest.mark.parametrize(("given", "count"), [((), 0), ((0, 0, 0), 0), ((0, 1, 2), 0), ((0, 0, 1), 2)])
@@ -153,3 +159,27 @@ def test_a_campaign_without_dates_is_as_it_was() -> None:
     believed = plain.own_belief(0, Spreads((0.5,), np.ones(3)))
     assert not believed[:, : plain.g].any()
     assert (plain.common_precision(Spreads((0.5,), np.ones(3))) == 1.0).all()
+
+
+@pytest.mark.slow
+def test_a_log_that_is_held_out_whole_is_not_charged_with_what_nobody_knows() -> None:
+    """A log of seconds on a day of its own: what its wind may be widens its prediction, and is no error of it."""
+    rng = np.random.default_rng(3)
+    of_day, other = campaign((FIRST, FIRST, FIRST)).members, campaign((SECOND, SECOND, SECOND)).members[1]
+    seconds = replace(
+        other.windows, starts=other.windows.starts[:3], runs=((0, 3),), measured=other.windows.measured[:3]
+    )
+
+    def noisy(member: Member) -> Member:
+        measured = member.windows.measured
+        noise = 0.3 * measured.std(axis=0) * rng.standard_normal(measured.shape)
+        return replace(member, windows=replace(member.windows, measured=measured + noise))
+
+    members = tuple(noisy(one) for one in (*of_day, replace(other, windows=seconds)))
+    made = estimate_campaign(replace(campaign(), members=members, sessions=(0, 0, 0, 1)))
+    none = estimate_campaign(without_conditions(made.campaign), noise=made.noise)
+    with_it, without = held_out_loss(made), held_out_loss(none)
+    gains = with_it.gain(without)
+    # Its squared errors alone would take eleven.
+    assert gains[with_it.log == 3].sum() > -4.0
+    assert Gain.of(gains).low > 0.0

@@ -8,6 +8,7 @@ from math import exp
 
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 
 from ferryid.diagnose.inference.campaign_course import _changes, _Knots, estimate_courses
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit, LogPart, bare_campaign
@@ -15,7 +16,7 @@ from ferryid.diagnose.inference.campaign_properties import _gaps_and_slopes, _li
 from ferryid.diagnose.inference.candidate import Candidate
 from ferryid.diagnose.inference.group_differences import SCATTERS, _averaged, _gram, _slopes, in_groups
 from ferryid.diagnose.inference.thresholds import INFERENCE
-from ferryid.diagnose.judging.campaign_evidence import _left, held_out_blocks
+from ferryid.diagnose.judging.campaign_evidence import _left, held_out_blocks, held_out_loss
 from ferryid.diagnose.judging.campaign_split import _Logs
 from ferryid.diagnose.judging.credibility import felt
 from ferryid.effects import effects
@@ -208,3 +209,30 @@ def test_what_is_felt_of_a_condition_has_its_session_in_it() -> None:
         difference = made.campaign.gap(i, made.common, made.own[i]) - still.gap(i, hull, made.own[i, 2:])
         measured = member.windows.along_vessel(member.windows.measured[:, member.windows.channels])
         assert shares[i] == pytest.approx(np.sqrt(np.mean(difference**2, axis=0) / np.mean(measured**2, axis=0)))
+
+
+def at_its_optimum(made: CampaignFit) -> CampaignFit:
+    """Return an estimate after a step, its gaps being linear."""
+    step, own = made.normal.step(made.common)
+    parts = tuple(
+        replace(part, gaps=part.gaps + part.slopes @ np.concatenate([step, mine]))
+        for part, mine in zip(made.parts, own, strict=True)
+    )
+    return replace(made, common=made.common + step, own=made.own + own, parts=parts)
+
+
+def test_the_density_that_the_rest_predicts_of_a_block() -> None:
+    made = at_its_optimum(noisy())
+    w, J, at, C = here(made)
+    loss = held_out_loss(made)
+    for i in range(3):
+        start, mine = rows_of(made, i).start, loss.blocks[loss.log == i]
+        for block, (shown, near) in enumerate(held_out_blocks(made.campaign.members[i].windows)):
+            kept = np.ones(len(J), dtype=bool)
+            kept[start + 3 * near.start : start + 3 * near.stop] = False
+            rest, rows = Regression(w[kept], J[kept], at, C), slice(start + 3 * shown.start, start + 3 * shown.stop)
+            predicted = multivariate_normal(
+                -J[rows] @ rest.move, np.eye(rows.stop - rows.start) + J[rows] @ rest.covariance @ J[rows].T
+            )
+            constant = (rows.stop - rows.start) * np.log(2.0 * np.pi)
+            assert mine[block] == pytest.approx(-2.0 * predicted.logpdf(w[rows]) - constant, rel=1e-4)

@@ -26,10 +26,9 @@ def told(lost: tuple[float, float, float], high: float, log: np.ndarray = SHORT)
     return note(cast("ConditionTest", test), PLACE)
 
 
-def test_the_log_that_loses_most_is_named_and_why() -> None:
+def test_the_log_that_loses_most_is_named() -> None:
     text = told((10.0, 20.0, 90.0), -40.0)
-    assert "Those stretches are predicted worse with it, most in short.bag (-90 nat)." in text
-    assert "It is so short that it is held out as a whole: its own current is not known then" in text
+    assert text.endswith("Those stretches are predicted worse with it, most in short.bag (-90 nat).")
 
 
 def test_a_log_of_several_stretches_knows_its_own() -> None:
