@@ -13,7 +13,7 @@ from ferryid.diagnose.checks.screening import screen_sensors, screen_together
 from ferryid.diagnose.data.measurements import measure_log
 from ferryid.diagnose.data.simulated import simulated
 from ferryid.diagnose.inference.campaign import assemble, repeated
-from ferryid.diagnose.inference.sessions import dated, start_ns
+from ferryid.diagnose.inference.sessions import dated, in_time, start_ns
 from ferryid.diagnose.inference.stages import AveragedLog, average
 from ferryid.diagnose.judging.campaign_split import Split, find_split
 from ferryid.diagnose.judging.diagnosis import distinct
@@ -246,7 +246,7 @@ def _parts(gathered: Gathered, references: Gathered, profile: Profile, model: Mo
             closed.append(group)
         else:
             open_groups += parts
-    order = [id(one) for one in _in_time(gathered.logs)]
+    order = [id(gathered.logs[i]) for i in in_time(gathered.logs)]
     return tuple(sorted(closed, key=lambda group: max(order.index(id(one)) for one in group.logs)))
 
 
@@ -260,14 +260,10 @@ def whole(gathered: Gathered, profile: Profile, model: Model | None) -> Gathered
     return Gathered(kept, (*dict.fromkeys(note for group in groups for note in group.notes), STAY), gathered.copies)
 
 
-def _in_time(logs: Sequence[AveragedLog]) -> list[AveragedLog]:
-    """Return logs in order of time; in the order in which they were given where times are no dates."""
-    return sorted(logs, key=start_ns) if all(dated(one) for one in logs) else list(logs)
-
-
 def _parted(group: Group, profile: Profile, model: Model | None) -> list[Group]:
     brought = {one.path for one in group.references}
-    assembled = assemble(_in_time([*group.logs, *group.references]), profile, model, brought)
+    every = [*group.logs, *group.references]
+    assembled = assemble([every[i] for i in in_time(every)], profile, model, brought)
     if assembled is None:
         return [group]
     campaign, place = assembled

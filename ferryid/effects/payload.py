@@ -73,8 +73,12 @@ def cannot(measurements: Measurements) -> str:
 def says(values: Values, instance: str | None) -> str:
     """Return the finding as a sentence."""
     word = "more" if values["mass"] > 0.0 else "less"
-    place = f"{abs(values['x']):.1f} m {'forward' if values['x'] >= 0.0 else 'aft'} of midship"
-    return f"The vessel carried {abs(values['mass']):.0f} kg {word} than the hull model allows for, {place}."
+    return f"The vessel carried {abs(values['mass']):.0f} kg {word} than the hull model allows for, {whereabouts(values['x'])}."
+
+
+def whereabouts(x: float) -> str:
+    """Return where a load is, in words."""
+    return f"{abs(x):.1f} m {'forward' if x >= 0.0 else 'aft'} of midship"
 
 
 def doubt(values: Values, profile: Profile) -> str:

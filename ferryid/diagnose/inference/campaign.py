@@ -14,7 +14,7 @@ from ferryid.diagnose.inference.campaign_logs import Member
 from ferryid.diagnose.inference.campaign_model import INDUCED, Campaign, HullPrior, induced, induced_spread
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.prior import correlation_root, prior_force_model
-from ferryid.diagnose.inference.sessions import sessions
+from ferryid.diagnose.inference.sessions import in_time, sessions
 from ferryid.diagnose.inference.stages import AveragedLog
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
@@ -47,8 +47,8 @@ class CommonHull:
         modelled = induced(replace(plain, hull=mean[:n]), mean[n:])
         campaign = self.fit.campaign
         own = np.zeros(campaign.l) if i is None else self.fit.own[i]
-        conditions = () if i is None else campaign.members[i].conditions
-        modelled = campaign.acted(modelled, conditions, self.fit.common, own)
+        conditions, group = ((), "") if i is None else (campaign.members[i].conditions, campaign.members[i].group)
+        modelled = campaign.acted(modelled, conditions, self.fit.common, own, group)
         return modelled, np.sqrt(np.diag(covariance))[:n]
 
     def says(self, path: str) -> str:
@@ -106,7 +106,8 @@ def assemble(
     spread = np.append(np.max(spreads, axis=0), size)
     prior = HullPrior(mean, spread, known, None if model is None else correlation_root(model, spread))
     by_path = {one.path: one for one in reversed(logs)}
-    return Campaign(tuple(members), prior, sessions=sessions([by_path[path] for path in place])), place
+    taken = [by_path[path] for path in place]
+    return Campaign(tuple(members), prior, sessions=sessions(taken), order=in_time(taken)), place
 
 
 def _conditions_of_logs(members: Sequence[Member], reference: Sequence[bool]) -> list[Member]:

@@ -74,13 +74,14 @@ class Campaign:
     sizes, and by how much those of each session depart from them; that of a log, shape (l,), its conditions' departures from
     the means of all logs, in sizes, and its steady acceleration. `sessions` numbers the session of each log; logs of one
     session are near in time, so that their conditions are more alike than those of different ones. Empty where times are not
-    known.
+    known. `order` holds the places of the logs in order of time, or as they were given where their times are no dates.
     """
 
     members: tuple[Member, ...]
     hull: HullPrior
     properties: tuple[Candidate, ...] = ()
     sessions: tuple[int, ...] = ()
+    order: tuple[int, ...] = ()
 
     @cached_property
     def conditions(self) -> tuple[Candidate, ...]:

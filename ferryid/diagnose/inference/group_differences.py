@@ -38,10 +38,10 @@ from ferryid.diagnose.inference.campaign_properties import (
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.effects import effects
-from ferryid.effects.effect import Effect
+from ferryid.effects.effect import Effect, Parameter
 from ferryid.effects.force_model import ForceModel
 from ferryid.side_by_side import over
-from ferryid.types import Floats
+from ferryid.types import Flags, Floats
 
 GROUPS = ("A", "B")
 """The logs that are named first, and those that they are compared with."""
@@ -94,6 +94,11 @@ def in_groups(campaign: Campaign, names: Sequence[str]) -> Campaign:
     """Return a campaign whose logs belong to groups, one name each."""
     members = tuple(replace(one, group=name) for one, name in zip(campaign.members, names, strict=True))
     return replace(campaign, members=members)
+
+
+def grouped_as(campaign: Campaign, other: Campaign) -> Campaign:
+    """Return a campaign whose logs belong to the groups of another of the same logs."""
+    return in_groups(campaign, [one.group for one in other.members])
 
 
 def differences_of(campaign: Campaign) -> list[Candidate]:
@@ -168,25 +173,12 @@ def select_differences(
         # What is compared has the same noise and has settled under it.
         made = estimate_campaign(made.campaign, noise=made.noise, begin=made)
         progress(f"weighing {len(left)} differences between the groups")
-        weighed = over(partial(compare_near, made), left)
-        order = sorted((one for one in weighed if _possible(one)), key=lambda one: -one.evidence)[:WEIGHED]
-        tried = []
-        for one in order:
-            if one.evidence > 0.0:
-                fit = _estimated(made, one.candidate)
-                tried.append((compare_estimated(fit, one.candidate, made), fit))
-        tried.sort(key=lambda pair: -pair[0].over_alike)
-        likely = [(one, fit) for one, fit in tried if one.evidence >= INFERENCE.prior_odds]
-        if not likely:
+        best = likeliest_difference(made, left)
+        if best is None:
             break
-        best, fit = likely[0]
-        contenders[best.candidate] = tuple(
-            Contender(one.candidate, one.over_alike - best.over_alike)
-            for one, _ in tried
-            if one is not best and one.over_alike <= best.over_alike
-        )
+        contenders[best.comparison.candidate] = best.contenders
         # With what it explains gone, the noise is less.
-        made = estimate_campaign(fit.campaign, begin=fit)
+        made = estimate_campaign(best.fit.campaign, begin=best.fit)
     for earlier in made.campaign.properties:
         # A later one may explain what an earlier one stood in for.
         if len(made.campaign.properties) > 1:
@@ -197,9 +189,41 @@ def select_differences(
     return made, tuple((one, contenders.get(one, ())) for one in found)
 
 
+@dataclass(frozen=True)
+class Likeliest:
+    """A difference that the evidence favours, the estimate with it, and what was tried in its place."""
+
+    comparison: Comparison
+    fit: CampaignFit
+    contenders: tuple[Contender, ...]
+
+
+def likeliest_difference(made: CampaignFit, left: Sequence[Candidate]) -> Likeliest | None:
+    """Return the likeliest of some differences beside an estimate that lacks them; None where the evidence favours none."""
+    weighed = over(partial(compare_near, made), left)
+    order = sorted((one for one in weighed if _possible(one)), key=lambda one: -one.evidence)[:WEIGHED]
+    tried = []
+    for one in order:
+        if one.evidence > 0.0:
+            fit = _estimated(made, one.candidate)
+            tried.append((compare_estimated(fit, one.candidate, made), fit))
+    tried.sort(key=lambda pair: -pair[0].over_alike)
+    likely = [(one, fit) for one, fit in tried if one.evidence >= INFERENCE.prior_odds]
+    if not likely:
+        return None
+    best, fit = likely[0]
+    behind = (one for one, _ in tried if one is not best and one.over_alike <= best.over_alike)
+    contenders = tuple(Contender(one.candidate, one.over_alike - best.over_alike) for one in behind)
+    return Likeliest(best, fit, contenders)
+
+
 def _possible(one: Comparison) -> bool:
     first = one.candidate.parameters[0]
-    away = float(one.values[0]) - first.neutral
+    return _on_its_side(first, float(one.values[0]) - first.neutral)
+
+
+def _on_its_side(first: Parameter, away: float) -> bool:
+    """Return whether an effect exists on this side of its neutral value."""
     return not (first.neutral == first.low and away < 0.0) and not (first.neutral == first.high and away > 0.0)
 
 
@@ -218,6 +242,30 @@ def compare_near(made: CampaignFit, candidate: Candidate) -> Comparison:
     evidence = with_it.evidence - without.evidence - candidate.log_alternatives
     over_alike = with_it.steady - without.steady - candidate.log_alternatives
     return _comparison(made, candidate, neutral, with_it, evidence, over_alike)
+
+
+def gains_of_ways(made: CampaignFit, candidate: Candidate, ways: Sequence[Flags]) -> list[float]:
+    """Return the evidence that a difference would add that acts in some of the logs, for several ways to choose them.
+
+    The gaps are taken to be linear in it and no scatter between logs is averaged over: what is likely is to be compared in
+    full. That of a way in which it would have the wrong sign is minus infinity.
+    """
+    slopes = _slopes(made, candidate, _in_sizes(candidate, candidate.start))
+    grams = over(lambda i: _gram(made, i, slopes[i]), range(len(slopes)))
+    g, p = made.campaign.g, len(candidate.parameters)
+    matrices, slopes_of_logs = np.stack([one.matrix for one in grams]), np.stack([one.slope for one in grams])
+    A = np.diag(made.normal.prior) + np.sum(matrices[:, :g, :g], axis=0)
+    settled = np.linalg.solve(A, made.normal.prior * made.common + np.sum(slopes_of_logs[:, :g], axis=0))
+    first = candidate.parameters[0]
+    found = []
+    for way in ways:
+        across, own = np.sum(matrices[way, :g, g:], axis=0), np.sum(matrices[way, g:, g:], axis=0)
+        S = np.eye(p) + own - across.T @ np.linalg.solve(A, across)
+        slope = np.sum(slopes_of_logs[way, g:], axis=0) - across.T @ settled
+        shift = -np.linalg.solve(S, slope)
+        gain = -0.5 * float(slope @ shift) - 0.5 * float(np.linalg.slogdet(S)[1]) - candidate.log_alternatives
+        found.append(gain if _on_its_side(first, float(shift[0])) else -np.inf)
+    return found
 
 
 def compare_estimated(made: CampaignFit, candidate: Candidate, without: CampaignFit) -> Comparison:

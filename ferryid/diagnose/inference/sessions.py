@@ -21,6 +21,12 @@ def dated(log: AveragedLog) -> bool:
     return start_ns(log) >= CLOCK_SET_NS
 
 
+def in_time(logs: Sequence[AveragedLog]) -> tuple[int, ...]:
+    """Return the places of logs in order of time; in the order in which they were given where some times are no dates."""
+    places = range(len(logs))
+    return tuple(sorted(places, key=lambda i: start_ns(logs[i])) if all(dated(one) for one in logs) else places)
+
+
 def sessions(logs: Sequence[AveragedLog]) -> tuple[int, ...]:
     """Return a number for each log, the same for logs of one session; empty where the times of all of them are no dates.
 

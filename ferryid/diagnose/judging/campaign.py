@@ -6,11 +6,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.campaign import CommonHull
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit, bare_campaign, estimate_campaign
 from ferryid.diagnose.inference.campaign_model import Campaign
 from ferryid.diagnose.inference.campaign_properties import properties_of
 from ferryid.diagnose.inference.estimation import Candidate
+from ferryid.diagnose.inference.group_differences import grouped_as
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.campaign_conditions import JudgedConditions, judge_conditions, note
 from ferryid.diagnose.judging.campaign_errors import LogErrors
@@ -19,6 +21,7 @@ from ferryid.diagnose.judging.campaign_properties import PropertyTest, judge_pro
 from ferryid.diagnose.judging.claims import Claim, Figures
 from ferryid.diagnose.judging.credibility import campaign_hull
 from ferryid.diagnose.judging.finding import Finding
+from ferryid.diagnose.judging.load_changes import LoadChangeTest, judge_load_change
 from ferryid.diagnose.judging.posterior import HullPosterior
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.force_model import COEFFICIENTS, ForceModel
@@ -34,6 +37,8 @@ class JudgedCampaign:
         Of each log, with the hull of all.
     properties
         Of the vessel.
+    load
+        A load that is aboard in some of the logs; None where the evidence favours none.
     bare, loss
         The logs without what is confirmed, under the same noise, and the loss of held-out blocks without and with it; None
         where nothing is confirmed.
@@ -41,6 +46,7 @@ class JudgedCampaign:
 
     conditions: JudgedConditions
     properties: tuple[PropertyTest, ...]
+    load: LoadChangeTest | None = None
     bare: CampaignFit | None = None
     loss: tuple[HeldOutLoss, HeldOutLoss] | None = None
 
@@ -82,7 +88,8 @@ class JudgedCampaign:
     @property
     def notes(self) -> tuple[str, ...]:
         """What was tested over all logs, as sentences."""
-        return tuple(note(one, self.hull.place) for one in self.conditions.tests)
+        load = () if self.load is None else (self.load.says,)
+        return (*load, *(note(one, self.hull.place) for one in self.conditions.tests))
 
     def claims(self, path: str) -> tuple[Claim, ...]:
         """Return what all logs together say of one of them, as findings."""
@@ -94,7 +101,9 @@ class JudgedCampaign:
             Claim(one.finding(windows), Figures("property", beyond_feedback=one.beyond_feedback))
             for one in self.properties
         )
-        return (*self.conditions.claims(path), *lasting)
+        load = None if self.load is None else self.load.finding(i)
+        aboard = () if load is None else (Claim(load, Figures("property")),)
+        return (*self.conditions.claims(path), *lasting, *aboard)
 
     def errors(self, path: str, findings: Sequence[Finding]) -> LogErrors | None:
         """Return the held-out errors of a log without and with what is confirmed over all logs; None where it shows none of it.
@@ -116,13 +125,46 @@ class JudgedCampaign:
 
 
 def judge_campaign(campaign: Campaign, place: Mapping[str, int], progress: Callable[[str], None]) -> JudgedCampaign:
-    """Judge what several logs say together: conditions, then properties beside them, then conditions beside these."""
+    """Judge what several logs say together.
+
+    Conditions come first, then properties beside them, then a load that is aboard in some of the logs beside both; conditions
+    are judged again beside what is confirmed.
+    """
     bare = estimate_campaign(bare_campaign(campaign))
-    conditions = judge_conditions(campaign, place, progress, bare)
-    properties = judge_properties(conditions.hull.fit, progress)
-    alone, confirmed = conditions, tuple(_begun(one) for one in properties if one.confirmed)
-    while confirmed:
-        conditions = judge_conditions(replace(campaign, properties=confirmed), place, progress, bare)
+
+    def judged(one: Campaign) -> JudgedConditions:
+        return judge_conditions(one, place, progress, bare)
+
+    alone = judged(campaign)
+    found = _beside(campaign, alone, judge_properties(alone.hull.fit, progress), judged)
+    progress("weighing loads that came aboard or were put ashore between logs")
+    load = judge_load_change(found[0].hull.fit, place)
+    if load is not None and load.confirmed:
+        aboard = _begun(load.change.candidate, load.difference.estimates)
+        parted = grouped_as(campaign, load.fit.campaign)
+        beside = _beside(parted, alone, found[1], judged, (aboard,))
+        again = load.beside(beside[0].hull.fit, aboard)
+        # A load that conditions beside it explain is none.
+        load, found = (again, beside) if again.confirmed else (None, found)
+    conditions, properties = found
+    return JudgedCampaign(conditions, properties, load, *_without_confirmed(conditions))
+
+
+def _beside(
+    campaign: Campaign,
+    alone: JudgedConditions,
+    properties: tuple[PropertyTest, ...],
+    judged: Callable[[Campaign], JudgedConditions],
+    loads: tuple[Candidate, ...] = (),
+) -> tuple[JudgedConditions, tuple[PropertyTest, ...]]:
+    """Return conditions judged beside confirmed properties and loads, and the properties tested beside these.
+
+    `alone` are the conditions where nothing is beside them.
+    """
+    conditions = alone
+    confirmed = tuple(_begun(one.candidate, one.estimates) for one in properties if one.confirmed)
+    while confirmed or loads:
+        conditions = judged(replace(campaign, properties=(*confirmed, *loads)))
         again = {one.key: tested(conditions.hull.fit, one, ()) for one in confirmed}
         held = tuple(one for one in confirmed if again[one.key].evidence >= INFERENCE.prior_odds)
         # What the evidence does not speak for beside the conditions is no hint either, and acts no longer.
@@ -135,16 +177,15 @@ def judge_campaign(campaign: Campaign, place: Mapping[str, int], progress: Calla
         if not gone:
             break
         confirmed, conditions = held, alone
-    return JudgedCampaign(conditions, properties, *_without_confirmed(conditions))
+    return conditions, properties
 
 
-def _begun(test: PropertyTest) -> Candidate:
+def _begun(candidate: Candidate, estimates: Mapping[str, Estimate]) -> Candidate:
     """Return a property from whose estimate a search begins."""
     parameters = tuple(
-        replace(one, start=test.estimates[one.name].value) if one.name in test.estimates else one
-        for one in test.candidate.parameters
+        replace(one, start=estimates[one.name].value) if one.name in estimates else one for one in candidate.parameters
     )
-    return replace(test.candidate, parameters=parameters)
+    return replace(candidate, parameters=parameters)
 
 
 def _without_confirmed(

@@ -186,7 +186,7 @@ def judge_groups(campaign: Campaign, progress: Callable[[str], None]) -> JudgedG
         if conditions.hull.fit.campaign.conditions != before:
             made = conditions.hull.fit
     progress("testing the differences on held-out stretches")
-    judged = [_judged(made, one, contenders) for one, contenders in found]
+    judged = [judged_difference(made, one, contenders) for one, contenders in found]
     judged.sort(key=lambda one: (bool(one.doubt), -one.evidence))
     taken = {(one.candidate.key, one.candidate.group) for one in judged}
     rest = [one for one in differences_of(made.campaign) if (one.key, one.group) not in taken]
@@ -203,7 +203,7 @@ def judge_groups(campaign: Campaign, progress: Callable[[str], None]) -> JudgedG
     )
 
 
-def _judged(made: CampaignFit, candidate: Candidate, contenders: Sequence[Contender]) -> Difference:
+def judged_difference(made: CampaignFit, candidate: Candidate, contenders: Sequence[Contender]) -> Difference:
     """Return what supports a difference of an estimate."""
     without = without_property(made, candidate)
     found = _difference(made, compare_estimated(made, candidate, without), False)

@@ -1,0 +1,98 @@
+"""A load that comes aboard between logs is found with its mass, place and time; logs that are alike carry none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from ferryid.diagnose.data.measurements import window_lengths
+from ferryid.diagnose.inference.campaign_logs import Member
+from ferryid.diagnose.inference.campaign_model import INDUCED, Campaign, HullPrior
+from ferryid.diagnose.inference.weak_form import windows
+from ferryid.diagnose.judging.campaign import JudgedCampaign, judge_campaign
+from ferryid.effects.force_model import ForceModel, hull_of
+from ferryid.types import no_progress
+from ferryid.vessel.wind import wind_force
+from tests.diagnose.inference.test_campaign_estimation import FERRY, SPREAD
+from tests.diagnose.judging.test_held_out import sailed
+
+pytestmark = pytest.mark.slow
+
+MASS, X = 0.15 * FERRY.hull.mass_kg, 0.8
+LOADED = replace(FERRY.hull, M=FERRY.hull.M + MASS * np.array([[1.0, 0.0, 0.0], [0.0, 1.0, X], [0.0, X, X**2]]))
+"""The vessel with a point mass aboard: Fossen (2021), equation 3.44, of the load alone."""
+
+
+@cache
+def sail(number: int, loaded: bool) -> Member:
+    """Return a log of 240 s; each begins elsewhere in the same forces, and has noise of its own."""
+    seconds, first = 240.0, 300 * number
+    whole = sailed(seconds + 0.2 * first, np.zeros(2), hull=LOADED if loaded else FERRY.hull)
+    rows = slice(first, None)
+    cut = {name: getattr(whole, name)[rows] for name in ("t", "eta", "nu_raw", "nu", "parts", "angles", "usable")}
+    seen = windows(replace(whole, **cut), *window_lengths(FERRY))
+    thin = seen.measurements
+    still = wind_force(FERRY.wind, np.zeros((len(thin.t), 2)), thin.psi, thin.nu)  # type: ignore[arg-type]
+    wrong = hull_of(FERRY) * np.where(np.arange(len(SPREAD)) % 2, 1.15, 0.85)
+    return Member(seen, ForceModel(thin, wrong, thin.parts, thin.angles, still))
+
+
+def campaign(loaded: Sequence[bool], order: Sequence[int] | None = None) -> Campaign:
+    members = tuple(sail(number, one) for number, one in enumerate(loaded))
+    none = np.zeros(len(INDUCED))
+    hull = HullPrior(np.append(members[0].plain.hull, none), np.append(SPREAD, none), known=False)
+    return Campaign(members, hull, order=tuple(range(len(members)) if order is None else order))
+
+
+def judged(whole: Campaign) -> JudgedCampaign:
+    return judge_campaign(whole, {f"trials/{i}.bag": i for i in range(len(whole.members))}, no_progress)
+
+
+def test_a_load_that_comes_aboard_is_found_in_the_logs_after_it() -> None:
+    found = judged(campaign([False, False, False, True, True, True]))
+    assert found.load is not None
+    assert found.load.confirmed
+    assert found.load.change.aboard == (3, 4, 5)
+    for name, true in (("mass", MASS), ("x", X)):
+        estimate = found.load.difference.estimates[name]
+        assert estimate.low < true < estimate.high
+    assert found.load.difference.estimates["mass"].value == pytest.approx(MASS, rel=0.25)
+    assert "more than in the 3 logs before" in found.load.says
+    assert found.load.says.endswith("a load came aboard between 2.bag and 3.bag.")
+    named = [[one.finding.effect for one in found.claims(f"trials/{i}.bag")].count("payload") for i in range(6)]
+    assert named == [0, 0, 0, 1, 1, 1]
+    assert found.notes[0] == found.load.says
+    # What all logs say together has it aboard where it was.
+    masses = [found.hull.fit.force_model(i).load is not None for i in range(6)]
+    assert masses == [False, False, False, True, True, True]
+
+
+def test_a_load_that_is_put_ashore_is_found_in_the_logs_before_it_whatever_their_order() -> None:
+    found = judged(campaign([False, True, False, True, True], order=(1, 4, 3, 0, 2)))
+    assert found.load is not None
+    assert found.load.change.aboard == (1, 4, 3)
+    assert found.load.says.endswith("a load was put ashore between 3.bag and 0.bag.")
+    assert "more than in the 2 logs after" in found.load.says
+
+
+@pytest.mark.parametrize("loaded", [[False] * 6, [True] * 6], ids=["none", "aboard all along"])
+def test_logs_that_are_alike_have_no_change(loaded: list[bool]) -> None:
+    assert judged(campaign(loaded)).load is None
+
+
+def test_one_log_that_differs_is_no_change() -> None:
+    assert judged(campaign([False, False, False, False, True])).load is None
+
+
+def test_a_load_that_was_measured_is_not_sought() -> None:
+    whole = campaign([False, False, False, True, True, True])
+    first = whole.members[0]
+    known = np.zeros((len(first.windows.measurements.t), 2))
+    measured = replace(first.windows, measurements=replace(first.windows.measurements, payload=known))
+    plain = replace(first.plain, measurements=measured.measurements)
+    told = replace(whole, members=(replace(first, windows=measured, plain=plain), *whole.members[1:]))
+    assert judged(told).load is None
