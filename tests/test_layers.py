@@ -20,6 +20,7 @@ ORDER = (
     "counts",
     "files",
     "interrupts",
+    "cached",
     "side_by_side",
     "freed",
     "compiler",

@@ -10,12 +10,12 @@ import os
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 from ferryid.batch.log_result import LogFile, LogResult
+from ferryid.cached import cached_property
 from ferryid.files import dump_json, remove_abandoned, sync, unwritable, write_text
 
 ROW = "row.json"

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
 from math import cos, inf, sin
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.cached import cached_property
 from ferryid.counts import counted
 from ferryid.effects.equations_of_motion import accelerations, from_antenna, required, slopes
 from ferryid.effects.wind_loads import shape_of, steady_wind_force, weighed_loads

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ferryid.cached import cached_property
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 from ferryid.identify.archived_logs import archived_folders, refuse_other_basis

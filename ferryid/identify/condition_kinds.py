@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
+from ferryid.cached import cached_property
 from ferryid.effects import effects
 from ferryid.identify.log_conditions import BlownLoad
 from ferryid.identify.thresholds import IDENTIFY

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ferryid.cached import cached_property
 from ferryid.identify.condition_kinds import WIND, ChangedWindows, ConditionKind, MotionSamples, gain_matrix, kinds_of
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.regression import MixedFit, fit_simpls

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 
+from ferryid.cached import cached_property
 from ferryid.identify.contradictions import faint_force
 from ferryid.identify.excitation import assess_excitation, still_warnings
 from ferryid.identify.fit_data import Coefficients, Estimate, FitData

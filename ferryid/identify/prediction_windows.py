@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 
+from ferryid.cached import cached_property
 from ferryid.identify.fit_data import Coefficients
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.shared_rows import SharedRows

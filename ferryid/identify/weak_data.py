@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property
 from math import isfinite
 from typing import Any, Self
 
 import numpy as np
 
+from ferryid.cached import cached_property
 from ferryid.counts import counted
 from ferryid.effects.force_model import COEFFICIENTS, hull_of
 from ferryid.effects.hull_spread import default_hull_spread

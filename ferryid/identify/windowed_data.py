@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from ferryid.cached import cached_property
 from ferryid.counts import counted
 from ferryid.identify.excitation import sector_coverage
 from ferryid.identify.fit_data import Coefficients, Estimate

@@ -10,7 +10,6 @@ from array import array
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from io import BytesIO
 from typing import Any, TypeVar
 
@@ -20,6 +19,7 @@ from mcap.exceptions import McapError
 from mcap.records import Channel, Schema, Statistics
 from numpy.typing import NDArray
 
+from ferryid.cached import cached_property
 from ferryid.ingest.formats.mcap import MAGIC
 from ferryid.ingest.log import Loss
 from ferryid.types import Nanoseconds

@@ -14,10 +14,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
+from ferryid.cached import cached_property
 from ferryid.types import Floats, Ints
 
 _RIDGE = 1e-10

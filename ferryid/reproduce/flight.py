@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache
 from importlib import resources
 from pathlib import Path
 
+from ferryid.cached import cached_property
 from ferryid.identify import FitSettings
 from ferryid.models import Model
 from ferryid.reproduce.learning import BASE, MASTER, THESIS, learn

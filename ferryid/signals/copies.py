@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
+from ferryid.cached import cached_property
 from ferryid.errors import FerryIdError
 from ferryid.signals.stream import Recording
 from ferryid.signals.thresholds import SIGNALS

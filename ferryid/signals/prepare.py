@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ferryid.cached import cached_property
 from ferryid.errors import FerryIdError
 from ferryid.signals.align import align
 from ferryid.signals.data_quality import left_out_sentences

@@ -10,11 +10,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from math import inf
 
 from scipy.stats import chi2
 
+from ferryid.cached import cached_property
 from ferryid.counts import counted
 from ferryid.diagnose.checks import refilter_velocity
 from ferryid.diagnose.data import read_measurements, window_lengths

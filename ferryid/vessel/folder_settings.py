@@ -7,10 +7,10 @@ import os
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from ferryid.cached import cached_property
 from ferryid.errors import FerryIdError
 from ferryid.ingest import existing_parts
 from ferryid.ingest.remote import copies_folder

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
+from ferryid.cached import cached_property
 from ferryid.identify.fit_data import Coefficients
 from ferryid.identify.motion_data import LogData, compute_residuals
 from ferryid.identify.prediction_windows import PredictionWindows

@@ -25,11 +25,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
+from ferryid.cached import cached_property
 from ferryid.diagnose.inference.campaign_model import Campaign, Spreads
 from ferryid.diagnose.inference.coloured_noise import ColouredNoise, Runs, fit_coloured_noise
 from ferryid.diagnose.inference.force_errors import mass_of

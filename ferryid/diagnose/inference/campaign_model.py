@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
 
+from ferryid.cached import cached_property
 from ferryid.diagnose.inference.campaign_logs import Member, Stack, stacked
 from ferryid.diagnose.inference.candidate import Candidate, apply_candidates
 from ferryid.effects.effect import Parameter

@@ -84,8 +84,8 @@ Rivals = Mapping[tuple[str, str | None], tuple[TriedProperty, ...]]
 def properties_of(campaign: Campaign) -> list[Candidate]:
     """Return every lasting property that no log rules out and some log can show of the actuator.
 
-    An error of the navigation is seen by forces only beside a hull that is known: one that comes from the same logs takes after
-    it. Kinematics alone shows it before.
+    An error of the navigation is seen by forces only beside a hull that is known, as one that comes from the same logs takes
+    after it, or where it makes port and starboard unlike, which no hull does.
     """
     logs = [member.windows.measurements for member in campaign.members]
     profile: Profile = logs[0].profile
@@ -94,7 +94,7 @@ def properties_of(campaign: Campaign) -> list[Candidate]:
         for one in effects().values()
         if (one.vessel or one.id in INSTRUMENTS or (one.id in LOADS and campaign.hull.known))
         and one.choose is None
-        and (campaign.hull.known or not one.of_sensor)
+        and (campaign.hull.known or one.sidewise or not one.of_sensor)
         and not any(one.excluded(measurements) for measurements in logs)
         for instance in one.instances(profile)
         if not all(one.cannot_be_of(measurements, instance) for measurements in logs)

@@ -12,10 +12,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
+from ferryid.cached import cached_property
 from ferryid.compiled import compiled
 from ferryid.types import Floats, Ints
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from math import inf, log
 
 import numpy as np
 
+from ferryid.cached import cached_property
 from ferryid.diagnose.inference.autoregression import AutoregressiveNoise, fit_autoregression
 from ferryid.diagnose.inference.candidate import Candidate as Candidate
 from ferryid.diagnose.inference.candidate import acting_order

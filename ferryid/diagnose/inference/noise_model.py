@@ -10,11 +10,11 @@ are states of the filter instead of being forced into the hull's coefficients.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from math import cos, exp, pi, sin
 
 import numpy as np
 
+from ferryid.cached import cached_property
 from ferryid.diagnose.inference.kalman import (
     DIFFUSE,
     gains_alone,

@@ -14,11 +14,11 @@ Shinbrot (1957); Messenger and Bortz (2021), Weak SINDy, for the choice of test 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.cached import cached_property
 from ferryid.compiled import compiled
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.effects.equations_of_motion import MASSES, damping_changes, over_ground, pushes, to_ground

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
+from ferryid.cached import cached_property
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.campaign import CommonHull
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit, bare_campaign, estimate_campaign

@@ -13,13 +13,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from math import exp
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ferryid.cached import cached_property
 from ferryid.counts import counted
 from ferryid.diagnose.data.course import Course
 from ferryid.diagnose.data.estimate import Estimate

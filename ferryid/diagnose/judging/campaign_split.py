@@ -15,10 +15,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
+from ferryid.cached import cached_property
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit, estimate_campaign
 from ferryid.diagnose.inference.campaign_model import Campaign
 from ferryid.diagnose.judging.campaign_evidence import Gain, held_out_blocks, without_conditions

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from math import isfinite, nan
 
 import numpy as np
 
+from ferryid.cached import cached_property
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
 from ferryid.effects.wording import listed, titled

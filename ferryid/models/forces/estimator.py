@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
+from ferryid.cached import cached_property
 from ferryid.effects.force_model import COEFFICIENTS, hull_of
 from ferryid.errors import FerryIdError
 from ferryid.models.forces.hull_terms import hull_contribution

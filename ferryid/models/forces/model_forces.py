@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
+from ferryid.cached import cached_property
 from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS, ForceModel, Measurements, required_force
 from ferryid.effects.measurements import hull_force_model

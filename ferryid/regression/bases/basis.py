@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from math import isfinite, nan
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.cached import cached_property
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.regression.bases.crossflow_integrals import crossflow_integrals
 from ferryid.regression.bases.forms import basis_forms

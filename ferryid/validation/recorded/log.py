@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
+from ferryid.cached import cached_property
 from ferryid.diagnose.data import read_measurements, window_lengths
 from ferryid.diagnose.inference import EstimationProblem, estimation_problem, prior_force_model, windows
 from ferryid.effects.force_model import Measurements

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache
 from math import inf, sqrt
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -29,6 +29,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from scipy.stats import norm
 
+from ferryid.cached import cached_property
 from ferryid.diagnose.data import read_measurements
 from ferryid.diagnose.inference import INFERENCE, EstimationProblem, fit, motion_responses
 from ferryid.diagnose.judging import candidates_of, response_columns

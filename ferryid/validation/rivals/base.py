@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.cached import cached_property
 from ferryid.effects.force_model import ForceModel, as_measured, required_force
 from ferryid.effects.measurements import measurements_of_motion, payload_and_damping
 from ferryid.models import blank_model, usable_rows

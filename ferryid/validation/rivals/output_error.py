@@ -10,12 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from math import cos, log, sin
 from pathlib import Path
 
 import numpy as np
 
+from ferryid.cached import cached_property
 from ferryid.compiled import borrowing, compiled
 from ferryid.counts import counted
 from ferryid.diagnose import Estimate
