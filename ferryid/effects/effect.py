@@ -192,7 +192,7 @@ class Effect:
     of_sensor
         True where it corrects what was measured: such effects act first, as the others act on what is true.
     sidewise
-        True where it makes port and starboard unlike, so that a hull whose two sides are alike cannot take after it.
+        Names of parameters that make port and starboard unlike: a hull whose two sides are alike cannot take after them.
     unsteady
         ``unsteady(force_model)(p)`` returns stochastic disturbances from positive parameters; none where the force model has
         nothing for them to act on. Such an effect changes no force model: it is a state of the filter.
@@ -248,7 +248,7 @@ class Effect:
     profiled: str = ""
     by_row: bool = False
     of_sensor: bool = False
-    sidewise: bool = False
+    sidewise: tuple[str, ...] = ()
     unsteady: Callable[[ForceModel], Processes] | None = None
     doubt: Callable[[Values, Profile], str] = lambda values, profile: ""
     doubt_of_ends: Callable[[Mapping[str, tuple[float, float]]], str] = lambda ends: ""

@@ -62,7 +62,7 @@ EFFECT = Effect(
     scenario,
     vessel=True,
     of_sensor=True,
-    sidewise=True,
+    sidewise=("angle",),
     negligible=EFFECTS.least_heading,
     regressor=regressor,
     formula_error=EFFECTS.definition_error,

@@ -42,7 +42,14 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
 
 def says(values: Values, instance: str | None) -> str:
     """Return the finding as a sentence."""
-    x, y = values["x"], values["y"]
+    y = values["y"]
+    if "x" not in values:
+        side = "to starboard" if y >= 0.0 else "to port"
+        return (
+            f"Position and velocity belong to a point {abs(y):.2f} m {side} of the body origin; how far ahead of it, "
+            "forces tell beside a hull model only."
+        )
+    x = values["x"]
     ends = ("ahead" if x >= 0.0 else "astern", "to starboard" if y >= 0.0 else "to port")
     return f"Position and velocity belong to a point {abs(x):.2f} m {ends[0]} and {abs(y):.2f} m {ends[1]} of the body origin."
 
@@ -54,7 +61,7 @@ def doubt(values: Values, profile: Profile) -> str:
 
 def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     """Return the scenario's antenna."""
-    return {"sensors": {"navigation": {"antenna_m": [values["x"], values["y"]]}}}
+    return {"sensors": {"navigation": {"antenna_m": [values.get("x", 0.0), values["y"]]}}}
 
 
 def regressor(force_model: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
@@ -71,6 +78,8 @@ EFFECT = Effect(
     scenario,
     vessel=True,
     of_sensor=True,
+    sidewise=("y",),
+    negligible=EFFECTS.least_arm,
     regressor=regressor,
     changes_hull=True,
     formula_error=EFFECTS.definition_error,

@@ -83,6 +83,12 @@ class EffectThresholds:
         "smaller heading biases are void, intervals no narrower",
         "convention: compasses are no better",
     )
+    least_arm: float = threshold(
+        0.05,
+        "m",
+        "smaller arms of an antenna are void, intervals no narrower",
+        "convention: how well a tape measures an antenna's place from the body origin",
+    )
     least_shallow: float = threshold(
         0.1,
         "of the damping",

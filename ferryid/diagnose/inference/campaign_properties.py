@@ -19,10 +19,11 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit, estimate_campaign
-from ferryid.diagnose.inference.campaign_model import DIFFERENCE_STEP, Campaign
+from ferryid.diagnose.inference.campaign_model import DIFFERENCE_STEP, Campaign, HullPrior
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.effects import effects
+from ferryid.effects.effect import HELD
 from ferryid.side_by_side import over
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
@@ -63,6 +64,19 @@ class ScoredProperty:
             return self.gain - other.gain
         return 0.5 * (other.fit.cost - self.fit.cost)
 
+    @property
+    def negligible(self) -> bool:
+        """Whether it is too small to be worth a name."""
+        campaign = self.fit.campaign
+        value = campaign.values(self.fit.common, self.fit.own[0])[1][campaign.properties.index(self.candidate)]
+        parameters, effect = self.candidate.parameters, self.candidate.effect
+        away = [
+            abs(at - one.neutral)
+            for at, one in zip(value.tolist(), parameters, strict=True)
+            if one.unit == parameters[0].unit
+        ]
+        return bool(max(away) < effect.negligible)
+
     def same_effect(self, other: ScoredProperty) -> bool:
         """Return whether it is the same effect of another actuator."""
         return self.candidate.effect.id == other.candidate.effect.id
@@ -85,12 +99,12 @@ def properties_of(campaign: Campaign) -> list[Candidate]:
     """Return every lasting property that no log rules out and some log can show of the actuator.
 
     An error of the navigation is seen by forces only beside a hull that is known, as one that comes from the same logs takes
-    after it, or where it makes port and starboard unlike, which no hull does.
+    after it, or where it makes port and starboard unlike, which no hull does: what else it has is held then.
     """
     logs = [member.windows.measurements for member in campaign.members]
     profile: Profile = logs[0].profile
     return [
-        Candidate.of(one, instance, profile)
+        _beside(campaign.hull, Candidate.of(one, instance, profile))
         for one in effects().values()
         if (one.vessel or one.id in INSTRUMENTS or (one.id in LOADS and campaign.hull.known))
         and one.choose is None
@@ -99,6 +113,15 @@ def properties_of(campaign: Campaign) -> list[Candidate]:
         for instance in one.instances(profile)
         if not all(one.cannot_be_of(measurements, instance) for measurements in logs)
     ]
+
+
+def _beside(hull: HullPrior, candidate: Candidate) -> Candidate:
+    """Return a property with what a hull that comes from the same logs would take after held where it does not act."""
+    if hull.known or not candidate.effect.of_sensor:
+        return candidate
+    seen = candidate.effect.sidewise
+    parameters = tuple(one if one.name in seen else replace(one, size=HELD) for one in candidate.parameters)
+    return replace(candidate, parameters=parameters)
 
 
 def select_properties(made: CampaignFit, progress: Callable[[str], None]) -> tuple[CampaignFit, Rivals]:
@@ -116,7 +139,7 @@ def select_properties(made: CampaignFit, progress: Callable[[str], None]) -> tup
             # A promise may be of what is impossible: what was estimated decides how much the others must promise.
             if one.gain > max([0.0, *(WORTH * other.gain for other in found)]):
                 found.append(_estimated(made, one))
-        found.sort(key=lambda one: -one.gain)
+        found = sorted((one for one in found if not one.negligible), key=lambda one: -one.gain)
         if not found or found[0].gain < INFERENCE.prior_odds:
             break
         best = found[0]

@@ -25,6 +25,7 @@ from ferryid.diagnose.judging.experiment_design import manoeuvre
 from ferryid.diagnose.judging.finding import Finding, Rival
 from ferryid.diagnose.judging.rivals import same_curve
 from ferryid.diagnose.judging.thresholds import JUDGING
+from ferryid.effects.effect import HELD
 from ferryid.effects.wording import weak_evidence
 from ferryid.side_by_side import over
 from ferryid.types import AXES, Floats
@@ -193,7 +194,7 @@ def tested(made: CampaignFit, candidate: Candidate, rivals: Sequence[TriedProper
     estimates = {
         one.name: Estimate.normal(float(at), float(e), one.unit)
         for one, at, e in zip(candidate.parameters, value, error, strict=True)
-        if one.name not in unreported
+        if one.name not in unreported and one.size > HELD
     }
     evidence = made.evidence - without.evidence
     others = [one for one in rivals if one.candidate.key not in {each.key for each in made.campaign.properties}]

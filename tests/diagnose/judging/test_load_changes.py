@@ -14,7 +14,7 @@ from ferryid.diagnose.inference.campaign_logs import Member
 from ferryid.diagnose.inference.campaign_model import INDUCED, Campaign, HullPrior
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.campaign import JudgedCampaign, judge_campaign
-from ferryid.effects.force_model import ForceModel, hull_of
+from ferryid.effects.force_model import ForceModel, Measurements, hull_of
 from ferryid.types import no_progress
 from ferryid.vessel.wind import wind_force
 from tests.diagnose.inference.test_campaign_estimation import FERRY, SPREAD
@@ -30,11 +30,16 @@ LOADED = replace(FERRY.hull, M=FERRY.hull.M + MASS * np.array([[1.0, 0.0, 0.0], 
 @cache
 def sail(number: int, loaded: bool) -> Member:
     """Return a log of 240 s; each begins elsewhere in the same forces, and has noise of its own."""
-    seconds, first = 240.0, 300 * number
-    whole = sailed(seconds + 0.2 * first, np.zeros(2), hull=LOADED if loaded else FERRY.hull)
+    first = 300 * number
+    whole = sailed(240.0 + 0.2 * first, np.zeros(2), hull=LOADED if loaded else FERRY.hull)
     rows = slice(first, None)
     cut = {name: getattr(whole, name)[rows] for name in ("t", "eta", "nu_raw", "nu", "parts", "angles", "usable")}
-    seen = windows(replace(whole, **cut), *window_lengths(FERRY))
+    return member_of(replace(whole, **cut))
+
+
+def member_of(measurements: Measurements) -> Member:
+    """Return a log with a force model whose coefficients are off by 15 %."""
+    seen = windows(measurements, *window_lengths(FERRY))
     thin = seen.measurements
     still = wind_force(FERRY.wind, np.zeros((len(thin.t), 2)), thin.psi, thin.nu)  # type: ignore[arg-type]
     wrong = hull_of(FERRY) * np.where(np.arange(len(SPREAD)) % 2, 1.15, 0.85)
@@ -42,10 +47,14 @@ def sail(number: int, loaded: bool) -> Member:
 
 
 def campaign(loaded: Sequence[bool], order: Sequence[int] | None = None) -> Campaign:
-    members = tuple(sail(number, one) for number, one in enumerate(loaded))
+    return together([sail(number, one) for number, one in enumerate(loaded)], order)
+
+
+def together(members: Sequence[Member], order: Sequence[int] | None = None) -> Campaign:
+    """Return a campaign of logs of a vessel without a hull model."""
     none = np.zeros(len(INDUCED))
     hull = HullPrior(np.append(members[0].plain.hull, none), np.append(SPREAD, none), known=False)
-    return Campaign(members, hull, order=tuple(range(len(members)) if order is None else order))
+    return Campaign(tuple(members), hull, order=tuple(range(len(members)) if order is None else order))
 
 
 def judged(whole: Campaign) -> JudgedCampaign:
