@@ -12,7 +12,7 @@ from ferryid.report.html import template
 from ferryid.report.interactive import STATIC, Interactive, make_interactive
 from ferryid.report.outcome import Report
 from ferryid.report.sweep_figures import curves, heat_cells, heat_map
-from ferryid.report.sweep_text import headline, render_sweep
+from ferryid.report.sweep_text import fit_with, headline, render_sweep
 from ferryid.report.sweep_timeline import sweep_timeline
 from ferryid.report.timeline import Timeline
 from ferryid.types import AXES, RunContext
@@ -101,6 +101,7 @@ def render(found: Sweep, command: Sequence[str] = (), interactive: Interactive =
         vessel=found.vessel,
         headline=headline(found),
         estimator=found.estimator_says,
+        fit_with=fit_with(found).partition(": ")[0],
         options=" ".join(found.fit_options),
         notes=found.notes,
         logs=[{**log, "seconds": f"{log['seconds']:.0f}"} for log in found.logs],
