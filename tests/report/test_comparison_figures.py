@@ -1,0 +1,41 @@
+"""Figures of a comparison on a recording: residuals below the forces, and where free runs go."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from ferryid.compare.candidates import select_candidates
+from ferryid.compare.comparison import Comparison, compare
+from ferryid.report.comparison_figures import forces, free_run_tracks, runs_to_draw
+from ferryid.types import RunContext
+from tests.compare.test_comparison import heavier
+
+pytestmark = pytest.mark.slow
+
+FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
+
+
+@pytest.fixture(scope="module")
+def compared(tmp_path_factory: pytest.TempPathFactory) -> Comparison:
+    field = select_candidates(["ferry@1", "ferry@2"], [heavier(1, 1.1), heavier(2, 1.5)])
+    return compare(field, [str(FIXTURES / "short.mcap")], RunContext(tmp_path_factory.mktemp("out")))
+
+
+def test_a_residual_below_every_force(compared: Comparison) -> None:
+    drawn = forces(compared.result, compared.logs[0], None)
+    labels = [part.partition("</text>")[0] for part in drawn.split(">") if "[N" in part]
+    assert [one.partition("<")[0] for one in labels] == [
+        "surge X [N]", "residual [N]", "sway Y [N]", "residual [N]", "yaw N [N·m]", "residual [N·m]",
+    ]  # fmt: skip
+
+
+def test_each_free_run_has_its_panel_with_every_model(compared: Comparison) -> None:
+    log = compared.logs[0]
+    runs = runs_to_draw(log)
+    drawn = free_run_tracks(compared.result, log, runs)
+    starts = [log.motion.t[log.path_rows[run, 0]] for run in runs]
+    assert [f">{start:.0f} to " in drawn for start in starts] == [True] * len(runs)
+    assert drawn.count(">east [m]<") == len(runs)
+    assert all(f">{label}<" in drawn for label in ("measured", *compared.result.labels))
