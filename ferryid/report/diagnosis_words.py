@@ -218,9 +218,27 @@ def where(finding: Finding) -> str:
         told += f"{', and' if told else 'It'} shows in {listed(shown)}"
     if finding.band_hz is not None:
         told += f", mostly between {finding.band_hz[0]:g} and {finding.band_hz[1]:g} Hz"
+    told += power_share(finding)
     # Where the vessel was while something passed is no property of it.
     regime = "" if finding.regime == EVERYWHERE or finding.ends else finding.regime
     return f"{told}; clearest at {regime}." if regime else f"{told}." if told else ""
+
+
+def power_share(finding: Finding) -> str:
+    """Return how much of the power left over the spectrum of a disturbance is, where it has half of its peak or more.
+
+    As the end of a sentence; empty for what has no spectrum.
+    """
+    evidence = finding.evidence
+    if not all(len(evidence.get(name, ())) > 1 for name in ("frequency", "before", "explained")):
+        return ""
+    frequency, explained, before = (evidence[name] for name in ("frequency", "explained", "before"))
+    strong = explained >= 0.5 * explained.max()
+    low, high = frequency[strong][[0, -1]]
+    share = min(1.0, float(explained[strong].sum() / max(before[strong].sum(), 1e-300)))
+    band = f"below {high:.2g} Hz" if strong[0] else f"{low:.2g} to {high:.2g} Hz"
+    axis = max(finding.axes, key=lambda one: finding.axes[one])
+    return f"; where it is strongest, {band}, it is {_percent(share)} of the power left over in {axis}"
 
 
 def _throughout(finding: Finding) -> bool:
