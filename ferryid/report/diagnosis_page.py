@@ -302,7 +302,7 @@ def _finding(
                 "caption": "Power spectrum of what is left over with the other findings, on the axis on which it acts most, "
                 "and what it is less that of the disturbance. What it explains: the spectrum of a disturbance of the strength "
                 "and duration that were found, averaged over windows like the rest. Where the finding holds, orange is nowhere "
-                "far below it; far above it, where blue lies on orange, it is a small part of noise and of what has no name.",
+                "far below it; far above it, where blue lies on orange, it is a small part of what is left over.",
             }
         )
     return {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from typing import Any
 
@@ -25,6 +26,20 @@ def template(name: str) -> Template:
     environment.globals["counted"] = counted
     environment.globals["heat_inline"] = inline()
     return environment.get_template(name)
+
+
+CONTENTS = "<!-- contents -->"
+"""Where a page has the links to its sections."""
+_SECTION = re.compile(r"<h2>(.*?)</h2>", re.DOTALL)
+
+
+def with_contents(page: str) -> str:
+    """Return a page with links to its sections at `CONTENTS`, and the names there that they lead to."""
+    titles = _SECTION.findall(page)
+    numbers = iter(range(1, len(titles) + 1))
+    named = _SECTION.sub(lambda one: f'<h2 id="section-{next(numbers)}">{one[1]}</h2>', page)
+    links = "".join(f'<li><a href="#section-{number}">{title}</a></li>' for number, title in enumerate(titles, 1))
+    return named.replace(CONTENTS, f'<nav class="contents" aria-label="Contents"><ul>{links}</ul></nav>')
 
 
 def _visible(value: Any) -> Any:
