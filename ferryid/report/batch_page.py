@@ -15,7 +15,7 @@ from urllib.parse import quote
 from ferryid.counts import counted
 from ferryid.diagnose import JUDGING
 from ferryid.report import batch_figures
-from ferryid.report.batch_findings import found_in, losses_in
+from ferryid.report.batch_findings import found_in, is_damaged, losses_in, sized_name
 from ferryid.report.batch_rows import (
     BatchResult,
     EvaluationSummary,
@@ -208,7 +208,7 @@ def _row(row: SummaryRow, name: str) -> TableRow:
         id=name,
         log=row.log,
         name=row.name,
-        status=row.status,
+        status=f"{row.status}, damaged" if is_damaged(row) else row.status,
         reason=row.reason,
         vessel=row.vessel,
         note=row.note,
@@ -245,11 +245,10 @@ def _lost(lost: LostData | None) -> Lost:
 
 
 def _named(findings: Sequence[FindingSummary]) -> tuple[NamedFinding, ...]:
-    """Return names, each once, and what is said of them."""
+    """Return names with sizes, each once, and what is said of them."""
     sentences: dict[str, list[str]] = {}
     for one in findings:
-        name = title(one.effect, one.instance)
-        sentences.setdefault(name[:1].lower() + name[1:], []).append(one.sentence)
+        sentences.setdefault(sized_name(one), []).append(one.sentence)
     return tuple(NamedFinding(name, " ".join(several)) for name, several in sentences.items())
 
 
