@@ -91,7 +91,7 @@ def test_what_rows_say() -> None:
     assert first["cells"]["fit"].startswith("accepted")
     assert first["cells"]["fitmse"] == "0.100"
     assert first["cells"]["rms"] == "9, 9, 9"
-    assert second["cells"]["found"] == "something without a name perhaps steady wind"
+    assert second["cells"]["found"] == "something without a name; perhaps steady wind"
     assert second["data"]["data-effects"].split("|")[1] == "Steady wind"
     assert second["data"]["data-verdict"] == "explained"
     # A name is no part of an address.

@@ -293,3 +293,38 @@ def test_a_batch_on_paper_is_whole_and_has_no_filters(page: Page, tmp_path: Path
     cut = "[...document.querySelectorAll('.scroll')].filter((one) => one.scrollWidth > one.clientWidth + 1).length"
     assert page.do(cut) == 0
     page.send("Emulation.setEmulatedMedia", media="")
+
+
+@pytest.mark.parametrize("width", [420, 800, 1200, 1500])
+def test_the_table_of_a_batch_is_not_cut(page: Page, tmp_path: Path, width: int) -> None:
+    path = tmp_path / "index.html"
+    path.write_text(render(hostile()), encoding="utf-8")
+    page.open(path, width)
+    cut = "[...document.querySelectorAll('.scroll')].filter((one) => one.scrollWidth > one.clientWidth + 1).length"
+    assert page.do(cut) == 0
+
+
+def test_paper_keeps_headings_heads_of_tables_and_figures_whole(page: Page, written: Path) -> None:
+    page.open(written)
+    page.send("Emulation.setEmulatedMedia", media="print")
+    styles = (
+        ("h2", "breakAfter", "avoid"),
+        ("thead", "breakAfter", "avoid"),
+        ("thead", "display", "table-header-group"),
+    )
+    for selector, name, value in (*styles, ("figure", "breakInside", "avoid"), ("tr", "breakInside", "avoid")):
+        assert page.do(f"getComputedStyle(document.querySelector({selector!r})).{name}") == value, (selector, name)
+    # Less than half of a sheet: a figure finds room below a text.
+    tallest = (
+        "Math.max(...[...document.querySelectorAll('figure svg')].map((one) => one.getBoundingClientRect().height))"
+    )
+    assert page.do(tallest) <= 530.0
+    page.send("Emulation.setEmulatedMedia", media="")
+
+
+def test_a_drawing_has_the_ground_of_a_dark_page(page: Page, written: Path) -> None:
+    page.open(written, dark=True)
+    blend = "getComputedStyle(document.querySelector('figure svg')).mixBlendMode"
+    assert page.do(blend) == "screen"
+    page.theme("light")
+    assert page.do(blend) == "normal"
