@@ -26,7 +26,7 @@ from ferryid.report.batch_rows import (
     date_text,
 )
 from ferryid.report.batch_timeline import errors_timeline, findings_timeline, row_id
-from ferryid.report.diagnosis_words import title
+from ferryid.report.diagnosis_words import positive_words, title
 from ferryid.report.html import template
 from ferryid.report.interactive import STATIC, Interactive
 from ferryid.report.timeline import Timeline
@@ -283,6 +283,7 @@ def _figures(result: BatchResult, interactive: Interactive) -> list[Figure]:
         logs = {point.log for one in every for point in one.points}
         order = "" if every[0].dated else " Not all logs have a date, so that they stand in their order."
         caption = f"{every[0].title} in {counted(len(logs), 'log')}, with their 95 % intervals.{order}"
+        caption = f"{caption} {positive_words(every[0].effect)}".rstrip()
         marks = "Hollow: a hint, less likely than not. Grey: logs whose diagnosis did not find it."
         shown.append((head, batch_figures.findings(every), caption, marks))
     for head, own, dated in _errors(result.rows):

@@ -10,7 +10,7 @@ from ferryid.counts import counted
 from ferryid.diagnose import JUDGING, UNKNOWN, Diagnosis, Estimate, Finding, worse_axes
 from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS
-from ferryid.effects.wording import listed, timed, titled
+from ferryid.effects.wording import listed, parameter_word, timed, titled
 from ferryid.report import least_sizes
 from ferryid.report.diagnosis_errors import fitted, ratio_of
 from ferryid.types import AXES
@@ -37,17 +37,6 @@ SIGN = (
     "sign turned round."
 )
 UNITS = {"surge": "N", "sway": "N", "yaw": "N·m"}
-NAMES = {
-    "seconds": "delay",
-    "per_mps": "loss by the speed of the inflow",
-    "std": "standard deviation",
-    "force_std": "standard deviation of the force",
-    "moment_std": "standard deviation of the moment",
-    "onset": "it began at",
-    "offset": "it ended at",
-    "growth": "strength at the end of the log over that at its start",
-}
-"""Parameters whose own names are no words."""
 DELAYS = {
     "clock_offset": ("the position after the velocity", "the velocity after the position"),
     "time_delay": ("the navigation's data after the actuators'", "the actuators' data after the navigation's"),
@@ -160,6 +149,11 @@ def numbers_of(parameters: Mapping[str, Estimate], effect: str = "") -> str:
     """Return parameters of an effect with intervals and units, one after the other."""
     every = [in_words(effect, name, [one]) for name, one in parameters.items()]
     return "; ".join(f"{name} {estimate(one)}" for name, (one,) in every)
+
+
+def positive_words(effect: str) -> str:
+    """Return what a positive delay of an effect says is late, as a sentence; empty for an effect that is no delay."""
+    return f"Positive: {DELAYS[effect][0]}." if effect in DELAYS else ""
 
 
 def in_words(effect: str, name: str, every: Sequence[Estimate]) -> tuple[str, list[Estimate]]:
@@ -522,7 +516,7 @@ def _odds(delta: float) -> str:
 
 def word(name: str) -> str:
     """Return the name of a parameter for people."""
-    return name if name in COEFFICIENTS else NAMES.get(name, name.replace("_", " "))
+    return name if name in COEFFICIENTS else parameter_word(name)
 
 
 def _inline(name: str) -> str:
