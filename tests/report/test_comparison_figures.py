@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from ferryid.compare.candidates import select_candidates
 from ferryid.compare.comparison import Comparison, compare
 from ferryid.report.comparison_figures import forces, free_run_tracks, runs_to_draw
+from ferryid.report.comparison_page import render
 from ferryid.types import RunContext
 from tests.compare.test_comparison import heavier
 
@@ -21,6 +23,19 @@ FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
 def compared(tmp_path_factory: pytest.TempPathFactory) -> Comparison:
     field = select_candidates(["ferry@1", "ferry@2"], [heavier(1, 1.1), heavier(2, 1.5)])
     return compare(field, [str(FIXTURES / "short.mcap")], RunContext(tmp_path_factory.mktemp("out")))
+
+
+def test_on_a_narrow_window_every_cell_says_what_it_is_of(compared: Comparison) -> None:
+    page = re.sub(r"<svg.*?</svg>", "", render(compared.result, compared.logs, {"date": ""})[0], flags=re.DOTALL)
+    style, *tables = page.split('<table class="fold">')
+    assert "@media (max-width: 700px)" in style
+    assert len(tables) == 2
+    for table in (one.partition("</table>")[0] for one in tables):
+        heads = [head for head in re.findall(r"<th(?: [^>]*)?>(.*?)</th>", table) if head]
+        rows = re.findall(r"<tr>(<td>.*?)</tr>", table, flags=re.DOTALL)
+        assert len(rows) == 3
+        for row in rows:
+            assert re.findall(r'<td[^>]* data-of="(.*?)"', row) == heads
 
 
 def test_a_residual_below_every_force(compared: Comparison) -> None:
