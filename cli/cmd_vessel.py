@@ -75,6 +75,7 @@ def new(
 
 def _asked(question: Question) -> str:
     """Ask a person, until the answer is one; nothing, or the end of the input, leaves it open."""
+    progress("")
     while True:
         try:
             answer = str(

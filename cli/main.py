@@ -85,10 +85,15 @@ def _run() -> object:
     from typer.exceptions import TyperException
 
     from ferryid.cli.app import app
+    from ferryid.cli.output import progress
 
     try:
         # Its name does not hang on how it is run: shells ask for completion by it.
-        code = app(prog_name="ferryid", standalone_mode=False)
+        try:
+            code = app(prog_name="ferryid", standalone_mode=False)
+        finally:
+            # An error stands on a line of its own, not behind the stage that it ended.
+            progress("")
         sys.stdout.flush()
         return code
     except TyperException as error:

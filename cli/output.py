@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import shutil
 import sys
+import threading
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -32,11 +34,63 @@ def text_width() -> int:
     return max(80, shutil.get_terminal_size((160, 24)).columns)
 
 
+class StageLine:
+    """The present stage on a terminal, and for how long the command has run; drawn again every second.
+
+    A stage may last for minutes: a clock that goes on says that the command does.
+    """
+
+    SHOWN_S = 2.0
+    """Time from which on it is told."""
+
+    def __init__(self) -> None:
+        self._lock = threading.RLock()
+        self._stage = ""
+        self._begun = time.monotonic()
+        self._clock: threading.Thread | None = None
+
+    def show(self, stage: str) -> None:
+        """Show a stage; an empty one clears the line."""
+        with self._lock:
+            self._stage = one_line(stage)
+            self._draw()
+            if self._stage and self._clock is None:
+                self._clock = threading.Thread(target=self._tick, daemon=True)
+                self._clock.start()
+
+    def text(self) -> str:
+        """Return what stands there, no longer than a line, as only one line can be cleared."""
+        seconds = time.monotonic() - self._begun
+        since = f" ({told_seconds(seconds)} so far)" if seconds >= self.SHOWN_S else ""
+        room = max(20, shutil.get_terminal_size((80, 24)).columns - 1 - len(since))
+        stage = self._stage if len(self._stage) <= room else f"{self._stage[: room - 1]}…"
+        return f"{stage}{since}"
+
+    def _draw(self) -> None:
+        sys.stderr.write(f"\r\033[K{self.text() if self._stage else ''}")
+        sys.stderr.flush()
+
+    def _tick(self) -> None:
+        while True:
+            time.sleep(1.0)
+            with self._lock:
+                if self._stage:
+                    self._draw()
+
+
+_line = StageLine()
+
+
 def progress(stage: str) -> None:
     """Show the present stage on a terminal, nothing when piped; an empty stage clears the line."""
     if sys.stderr.isatty():
-        sys.stderr.write(f"\r\033[K{one_line(stage)}")
-        sys.stderr.flush()
+        _line.show(stage)
+
+
+def told_seconds(seconds: float) -> str:
+    """Return a time that has passed, such as ``1:05 min``."""
+    whole = int(seconds)
+    return f"{whole} s" if whole < 60 else f"{whole // 60}:{whole % 60:02d} min"
 
 
 def tell(line: str) -> None:

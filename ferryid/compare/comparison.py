@@ -38,7 +38,7 @@ from ferryid.models.prediction import (
     WindowErrors,
     predict,
     runs_free,
-    single_runs,
+    single_paths,
     starting_points,
     window_errors,
 )
@@ -52,7 +52,7 @@ from ferryid.regression.resampling import (
 from ferryid.signals.copies import GivenLogs
 from ferryid.signals.prepare import Prepared, prepare
 from ferryid.signals.track import Motion
-from ferryid.types import AXES, Flags, Floats, RunContext, by_axis
+from ferryid.types import AXES, Flags, Floats, Ints, RunContext, by_axis
 from ferryid.vessel.dimensions import window_seconds
 from ferryid.vessel.profile import Profile
 
@@ -88,6 +88,9 @@ class ComparedLog:
         Absolute errors of the free runs, shape (m, s, horizons, 4); NaN where a run did not get there.
     reached
         Horizons that lie within the stretch of a run, shape (s, horizons).
+    paths, path_rows
+        Where the free runs went north and east [m], shape (m, s, k, 2), and the rows of the log at these k times, shape (s, k);
+        NaN where a run did not get there.
     warnings
         What a reader must know of this log.
     """
@@ -104,6 +107,8 @@ class ComparedLog:
     starts_s: Floats
     errors: Floats
     reached: Flags
+    paths: Floats
+    path_rows: Ints
     warnings: tuple[str, ...]
 
 
@@ -224,9 +229,15 @@ def _compare_log(
     steps = np.round(np.array(HORIZONS_S) * motion.rate_hz).astype(int)
     reached = starts[:, None] + steps < ends[:, None]
     errors = np.full((len(seen), len(starts), len(HORIZONS_S), len(KEYS)), np.nan)
+    went: dict[int, Floats] = {}
+    stride = 1
     for k, prediction in enumerate(seen):
         if len(starts) and runs_free(prediction.force, prediction.motion):
-            errors[k] = single_runs(prediction.force, prediction.motion, starts, ends, HORIZONS_S)
+            errors[k], went[k], stride = single_paths(prediction.force, prediction.motion, starts, ends, HORIZONS_S)
+    paths = np.full((len(seen), len(starts), max((one.shape[1] for one in went.values()), default=0), 2), np.nan)
+    for k, places in went.items():
+        paths[k] = places
+    path_rows = np.minimum(starts[:, None] + np.arange(paths.shape[2]) * stride, len(motion.t) - 1)
     predicted = _predict_windows(seen, motion, rows, field.profile)
     warnings = [*prepared.doubts, *prepared.left_out]
     for one in field.candidates:
@@ -251,6 +262,8 @@ def _compare_log(
         starts_s=motion.t[starts],
         errors=errors,
         reached=reached,
+        paths=paths,
+        path_rows=path_rows,
         warnings=tuple(warnings),
     )
 

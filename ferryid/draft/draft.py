@@ -13,6 +13,7 @@ from ferryid.draft.fields import navigation_groups
 from ferryid.draft.kinematics import navigation_signals
 from ferryid.draft.mapped import MappedSignal
 from ferryid.draft.samples import read_samples
+from ferryid.draft.unnamed import shown_by_values
 from ferryid.draft.wind import wind_fields, wind_signal
 from ferryid.errors import FerryIdError
 from ferryid.ingest import open_log
@@ -103,8 +104,12 @@ def draft_profile(log: str | Path, like: Profile | None = None, ranges: TimeRang
     for topic, speed, direction in winds:
         wanted.setdefault(topic, []).extend((speed, direction))
     if not wanted:
+        shown = "; ".join(shown_by_values(reader, str(log), ranges))
         raise FerryIdError(
-            f"{log}: {_nothing(topics)}. Fix: write the signal map by hand, see ferryid vessel show --toml"
+            f"{log}: {_nothing(topics)}, and names decide what is compared"
+            f"{f'. By their values {shown}; which are orders no values show' if shown else ''}. Fix: "
+            f"{_RENAME if any(one.name == 'table' for one in topics) else ''}write the signal map by hand, see ferryid "
+            "vessel show --toml"
         )
     samples = read_samples(reader, wanted, str(log), ranges)
     looked_for = fields
@@ -173,8 +178,16 @@ def _left_over(
     )
 
 
+_RENAME = 'name the columns after what they are, as in "N [m]", "psi [deg]", "u [m/s]", "r [deg/s]", "rpm", or '
+
+
 def _nothing(topics: Sequence[Topic]) -> str:
-    return f"no topic has a name of pose, velocity, heading or actuator, found {_listed([one.name for one in topics])}"
+    return f"no topic has a name of pose, velocity, heading or actuator, found {_listed(_fields(topics))}"
+
+
+def _fields(topics: Sequence[Topic]) -> list[str]:
+    """Return the names of topics, and of the columns where the log is a table."""
+    return [path for one in topics for path in ((*one.fields,) if one.name == "table" else (one.name,))]
 
 
 def _listed(names: Sequence[str]) -> str:

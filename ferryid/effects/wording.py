@@ -1,4 +1,4 @@
-"""How results are worded: directions and lists."""
+"""How results are worded: directions, parameters and lists."""
 
 from __future__ import annotations
 
@@ -11,6 +11,23 @@ WINDS = (
     *("west", "west-north-west", "north-west", "north-north-west"),
 )
 """The sixteen points of the compass, clockwise."""
+
+PARAMETER_WORDS = {
+    "seconds": "delay",
+    "per_mps": "loss by the speed of the inflow",
+    "std": "standard deviation",
+    "force_std": "standard deviation of the force",
+    "moment_std": "standard deviation of the moment",
+    "onset": "it began at",
+    "offset": "it ended at",
+    "growth": "strength at the end of the log over that at its start",
+}
+"""Parameters whose own names are no words."""
+
+
+def parameter_word(name: str) -> str:
+    """Return the name of an effect's parameter for people."""
+    return PARAMETER_WORDS.get(name, name.replace("_", " "))
 
 
 def compass_point(degrees: float) -> str:

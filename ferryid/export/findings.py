@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -20,6 +21,11 @@ from ferryid.simulate.messages import typestore
 from ferryid.simulate.sensors import Stream
 
 TOPIC = "/diagnostics"
+VALUES = "/ferryid/finding/"
+ENDS = ("onset", "offset")
+"""Parameters that the times of the values tell already."""
+CDR = b"\x00\x01\x00\x00"
+"""The head of a message in the encapsulation that ROS 2 uses."""
 OK, WARN = 0, 1
 LASTING_S = 1.0
 """What is seen until so shortly before the end of a log has not ended [s]."""
@@ -144,7 +150,7 @@ def _spans(where: Mapping[str, Any], end_s: float) -> list[tuple[float, float | 
 
 
 def _values(finding: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    yield "probability", _text(finding["probability"])
+    yield "probability", _probability(finding["probability"])
     for name, one in finding["parameters"].items():
         unit = "" if one["unit"] == "-" else f" {one['unit']}"
         yield name, f"{_text(one['value'])}{unit} ({_text(one['low'])} to {_text(one['high'])})"
@@ -152,6 +158,38 @@ def _values(finding: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         yield f"held-out error removed, {axis}", _text(share)
     if finding["unresolved_with"]:
         yield "not separated from", ", ".join(finding["unresolved_with"])
+
+
+def finding_values(path: Path, diagnosis: Mapping[str, Any], t0_ns: int, end_s: float) -> list[Stream]:
+    """Return the parameters of findings as numbers over time, once a second, NaN while a finding does not act.
+
+    Viewers plot numbers; the diagnostics hold texts. Arguments are those of `told_by`, and `t0_ns` as of `diagnostics`.
+    """
+    seconds = np.arange(0.0, end_s + 1.0)
+    seconds[-1] = min(seconds[-1], end_s)
+    times = t0_ns + np.round(seconds * 1e9).astype(np.int64)
+    streams: list[Stream] = []
+    with _whole(path):
+        for finding in diagnosis["findings"]:
+            acts = np.zeros(len(seconds), dtype=bool)
+            for first, last in _spans(finding["where"], end_s):
+                acts |= (seconds >= first) & (seconds <= (end_s if last is None else last))
+            of = "/".join(str(one) for one in (finding["effect"], finding["instance"]) if one)
+            for name, one in finding["parameters"].items():
+                if name in ENDS or one["value"] is None:
+                    continue
+                values = np.where(acts, float(one["value"]), np.nan)
+                messages = tuple(CDR + value.tobytes() for value in values.astype("<f8"))
+                topic = re.sub(r"[^\w/]", "_", f"{VALUES}{of}/{name}")
+                streams.append(Stream(topic, "std_msgs/msg/Float64", "", times, times, {}, whole=messages))
+    return streams
+
+
+def _probability(value: float | None) -> str:
+    """Return a probability as reports tell it, without pretending to certainty."""
+    if value is None or not isfinite(value):
+        return "unknown"
+    return "above 0.99" if value > 0.99 else "below 0.01" if value < 0.01 else f"{value:.2f}"
 
 
 def _text(value: float | None) -> str:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ferryid.errors import FerryIdError
+from ferryid.export.findings import VALUES
 from ferryid.export.words import MARK
 
 Curve = tuple[str, str, str]
@@ -80,8 +81,9 @@ def foxglove(topics: Sequence[str]) -> str:
             {
                 "value": f"{topic}.{field}",
                 "enabled": True,
-                "timestampMethod": "headerStamp",
-                "label": topic.rpartition("/")[2] if field.startswith("wrench") else _VELOCITIES.get(field, field),
+                # A bare number has no header.
+                "timestampMethod": "receiveTime" if field == "data" else "headerStamp",
+                "label": _VELOCITIES.get(field, topic.rpartition("/")[2]),
                 "color": colour,
             }
             for topic, field, colour in curves
@@ -127,7 +129,12 @@ def _tabs(topics: Sequence[str]) -> Mapping[str, Mapping[str, list[Curve]]]:
     if "/ferryid/velocity" in topics:
         curves = [("/ferryid/velocity", field, colour) for field, colour in zip(_VELOCITIES, _OTHERS, strict=True)]
         tabs["Motion"] = {"Velocity [m/s], yaw rate [rad/s]": curves}
-    return tabs
+    values: dict[str, list[Curve]] = {}
+    for topic in (one for one in topics if one.startswith(VALUES)):
+        finding = topic.removeprefix(VALUES).rpartition("/")[0]
+        curves = values.setdefault(finding.replace("_", " ").replace("/", ", "), [])
+        curves.append((topic, "data", _OTHERS[len(curves) % len(_OTHERS)]))
+    return tabs | ({"Findings": values} if values else {})
 
 
 def _stacked(names: Sequence[str]) -> Any:

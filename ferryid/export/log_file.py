@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid import __version__
 from ferryid.errors import FerryIdError
-from ferryid.export.findings import diagnostics, read_diagnosis, told_by
+from ferryid.export.findings import diagnostics, finding_values, read_diagnosis, told_by
+from ferryid.export.frames import BODY, WORLD, transform_streams
 from ferryid.export.layouts import check_layouts, foxglove, layout_files, plotjuggler
 from ferryid.export.model_file import SCHEMA
 from ferryid.files import replacing, write_text
@@ -32,8 +34,6 @@ _END_BYTES = 1 << 20
 """Of a file, which hold its list of topics."""
 WINDOW_S = 1.0
 """Smoothing window without a model [s], that of a fit."""
-WORLD, BODY = "map_ned", "base_link_frd"
-"""Frames by the names of ROS REP 103: they are not the usual ones of ROS, whose z points up."""
 WRENCH = ("wrench.force.x", "wrench.force.y", "wrench.torque.z")
 TWIST = ("twist.linear.x", "twist.linear.y", "twist.angular.z")
 
@@ -117,9 +117,19 @@ def export_log(
     if diagnosis is not None and found is not None:
         told = told_by(diagnosis, found, float(motion.t[-1]))
         streams.append(diagnostics(told, track.t0_ns, profile.name))
+        streams += finding_values(diagnosis, found, track.t0_ns, float(motion.t[-1]))
     _check_any(streams, prepared)
+    about = {
+        "version": __version__,
+        "vessel": profile.name,
+        "model": "" if model is None else model.label,
+        "log": motion.log,
+        "log_sha256": prepared.recording.sha256,
+        "window_s": f"{window_s:g}",
+        "smoother": smoother,
+    }
     with replacing(mcap, new=not overwrite, by="--mcap") as temporary:
-        write_mcap(streams, temporary, CHUNK_BYTES)
+        write_mcap(streams, temporary, CHUNK_BYTES, library=f"ferryid {__version__}", metadata={"ferryid": about})
     topics = [one.topic for one in streams]
     layouts = layout_files(mcap)
     for place, text in zip(layouts, (plotjuggler(topics, mcap), foxglove(topics)), strict=True):
@@ -183,6 +193,9 @@ def _streams(motion: Motion, t0_ns: int, base: Floats, tau: Floats | None) -> li
     made = [stream(f"{_FORCE}{name}", "WrenchStamped", BODY, WRENCH, force) for name, force in forces.items()]
     made.append(stream("/ferryid/velocity", "TwistStamped", BODY, TWIST, motion.nu))
     made.append(stream("/ferryid/pose", "PoseStamped", WORLD, where, pose))
+    placed = _known(motion, motion.eta)
+    if placed.any():
+        made += transform_streams(times[placed], motion.eta[placed])
     return [one for one in made if len(one.stamp_ns)]
 
 

@@ -98,7 +98,10 @@ def open_text(path: Path, layout: TableLayout | None, topic: str = "table") -> T
             }
         )
         if plan is None:
-            raise FerryIdError(no_time(str(path), names))
+            numbers = {
+                name: numbers_from_text(np.array(v, dtype=object), shape.decimal)[0] for name, v in sample.items()
+            }
+            raise FerryIdError(no_time(str(path), names, numbers))
         plan = with_stated_unit(plan, layout)
         notes.append(plan.note)
     else:

@@ -233,16 +233,28 @@ def with_stated_unit(plan: TimePlan, layout: TableLayout | None) -> TimePlan:
     return replace(plan, unit=layout.time_unit, note=note)
 
 
-def no_time(where: str, names: Sequence[str]) -> str:
-    """Return the message for a table in which no column looks like a time."""
+def no_time(where: str, names: Sequence[str], sample: Mapping[str, Column] | None = None) -> str:
+    """Return the message for a table in which no column looks like a time; of numbers of its first rows, which always rise."""
     likely = [name for name in names if has_time_word(name)]
     found = (
         f"{_listed(likely)} of {counted(len(names), 'column')}, whose values do not rise" if likely else _listed(names)
     )
+    rising = [f"{name} (by {step:.4g})" for name, step in _rising(sample or {})]
+    shown = f"; by the values it may be {' or '.join(rising[:3])}, which rises from row to row" if rising else ""
     return (
-        f"{where}: no column of this table looks like a time, found {found}. "
-        "Fix: name the time column as time under [table] in the profile, and its time_unit"
+        f"{where}: no column of this table looks like a time, found {found}{shown}. "
+        "Fix: name the time column as time under [table] in the profile, and its time_unit; without a profile, rename it in "
+        'the file to "time [s]"'
     )
+
+
+def _rising(sample: Mapping[str, Column]) -> list[tuple[str, float]]:
+    """Return the columns whose numbers rise with every row, with their median step."""
+    found = []
+    for name, values in sample.items():
+        if values.dtype.kind in "iuf" and len(values) > 2 and np.all(np.diff(values) > 0):
+            found.append((name, float(np.median(np.diff(values)))))
+    return found
 
 
 def unique_names(names: Sequence[str]) -> tuple[tuple[str, ...], str]:

@@ -14,6 +14,7 @@ from matplotlib.ticker import MaxNLocator
 
 from ferryid.diagnose import JUDGING
 from ferryid.report.batch_rows import ByAxis, SummaryRow, Trend, TrendPoint
+from ferryid.report.diagnosis_words import word
 from ferryid.report.figures import BASE, MEASURED, NEW, STYLE, UNITS, canvas, svg_text
 from ferryid.types import AXES
 
@@ -56,7 +57,7 @@ def findings(trends: Sequence[Trend]) -> str:
 def parameter_label(one: Trend) -> str:
     """Return the name of a parameter, with its unit where it has one."""
     unit = "" if one.unit == "-" else f" [{one.unit}]"
-    return f"{one.parameter.replace('_', ' ')}{unit}"
+    return f"{word(one.parameter)}{unit}"
 
 
 def errors(rows: Sequence[SummaryRow], dated: bool) -> str:

@@ -29,24 +29,32 @@ def found_in(rows: Sequence[SummaryRow]) -> str:
 
 def losses_in(rows: Sequence[SummaryRow]) -> str:
     """Return how many logs are damaged, and which: a log that was cut is done like any other, but not whole. Empty without."""
-    damaged = [
-        PurePath(row.log).name for row in rows if row.lost is not None and (row.lost.messages or row.lost.unknown)
-    ]
+    damaged = [PurePath(row.log).name for row in rows if is_damaged(row)]
     if not damaged:
         return ""
     more = f" and {len(damaged) - NAMED} more" if len(damaged) > NAMED else ""
     return f"{counted(len(damaged), 'log')} damaged, of which some is lost: {', '.join(damaged[:NAMED])}{more}"
 
 
+def is_damaged(row: SummaryRow) -> bool:
+    """Return whether some of a log is lost."""
+    return row.lost is not None and bool(row.lost.messages or row.lost.unknown)
+
+
 def _named(some: Sequence[FindingSummary]) -> str:
-    first = some[0]
-    name = title(first.effect, first.instance)
-    name = name[:1].lower() + name[1:]
-    if len(some) > 1:
-        return name
+    return sized_name(some[0]) if len(some) == 1 else _name(some[0])
+
+
+def _name(one: FindingSummary) -> str:
+    name = title(one.effect, one.instance)
+    return name[:1].lower() + name[1:]
+
+
+def sized_name(first: FindingSummary) -> str:
+    """Return the name of a finding with its size: a breeze and a thruster at half its force are not alike."""
     known = {
         key: Estimate(one.value, nan if one.low is None else one.low, nan if one.high is None else one.high, one.unit)
         for key, one in first.parameters.items()
         if one.value is not None
     }
-    return sized(name, first.effect, known)
+    return sized(_name(first), first.effect, known)

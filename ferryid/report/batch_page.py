@@ -15,7 +15,7 @@ from urllib.parse import quote
 from ferryid.counts import counted
 from ferryid.diagnose import JUDGING
 from ferryid.report import batch_figures
-from ferryid.report.batch_findings import found_in, losses_in
+from ferryid.report.batch_findings import found_in, is_damaged, losses_in, sized_name
 from ferryid.report.batch_rows import (
     BatchResult,
     EvaluationSummary,
@@ -26,7 +26,7 @@ from ferryid.report.batch_rows import (
     date_text,
 )
 from ferryid.report.batch_timeline import errors_timeline, findings_timeline, row_id
-from ferryid.report.diagnosis_words import title
+from ferryid.report.diagnosis_words import positive_words, title
 from ferryid.report.html import template
 from ferryid.report.interactive import STATIC, Interactive
 from ferryid.report.timeline import Timeline
@@ -208,7 +208,7 @@ def _row(row: SummaryRow, name: str) -> TableRow:
         id=name,
         log=row.log,
         name=row.name,
-        status=row.status,
+        status=f"{row.status}, damaged" if is_damaged(row) else row.status,
         reason=row.reason,
         vessel=row.vessel,
         note=row.note,
@@ -245,11 +245,10 @@ def _lost(lost: LostData | None) -> Lost:
 
 
 def _named(findings: Sequence[FindingSummary]) -> tuple[NamedFinding, ...]:
-    """Return names, each once, and what is said of them."""
+    """Return names with sizes, each once, and what is said of them."""
     sentences: dict[str, list[str]] = {}
     for one in findings:
-        name = title(one.effect, one.instance)
-        sentences.setdefault(name[:1].lower() + name[1:], []).append(one.sentence)
+        sentences.setdefault(sized_name(one), []).append(one.sentence)
     return tuple(NamedFinding(name, " ".join(several)) for name, several in sentences.items())
 
 
@@ -284,6 +283,7 @@ def _figures(result: BatchResult, interactive: Interactive) -> list[Figure]:
         logs = {point.log for one in every for point in one.points}
         order = "" if every[0].dated else " Not all logs have a date, so that they stand in their order."
         caption = f"{every[0].title} in {counted(len(logs), 'log')}, with their 95 % intervals.{order}"
+        caption = f"{caption} {positive_words(every[0].effect)}".rstrip()
         marks = "Hollow: a hint, less likely than not. Grey: logs whose diagnosis did not find it."
         shown.append((head, batch_figures.findings(every), caption, marks))
     for head, own, dated in _errors(result.rows):

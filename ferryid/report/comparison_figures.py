@@ -13,7 +13,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from ferryid.compare import CommonErrors, ComparedLog, ComparedModel, ComparisonResult, ModelPair
 from ferryid.report.figures import MEASURED, STYLE, SYMBOLS, UNITS, canvas, legend_above, margins, svg_text
 from ferryid.report.structure import envelope
-from ferryid.types import AXES, Floats
+from ferryid.types import AXES, Flags, Floats
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Okabe and Ito's, which the colour-blind tell apart."""
@@ -128,20 +128,24 @@ def _plain_ticks(axis: Any, low: float, high: float) -> None:
 
 
 def forces(result: ComparisonResult, trial: ComparedLog, start_s: float | None) -> str:
-    """Measured force and every model's estimate in the minute of a log that starts at `start_s`; in all of it where None."""
+    """Measured force, every model's estimate and its residual below, in the minute of a log from `start_s`; None: in all."""
     look = looks(result.models)
     with mpl.rc_context(STYLE):
-        figure, axes = canvas(3, 5.4, top=0.3 + 0.2 * ((len(look) + 3) // 3))
+        figure, axes = canvas(2 * len(AXES), 8.4, top=0.3 + 0.2 * ((len(look) + 3) // 3))
         t = trial.motion.t
         first, last = (t[0], t[-1]) if start_s is None else (start_s, start_s + MINUTE_S)
         inside = np.flatnonzero((t >= first) & (t <= last))
         missing = np.where(trial.rows[inside, None], 1.0, np.nan)
-        for j, ax in enumerate(axes):
+        known = inside[trial.rows[inside]]
+        for j in range(len(AXES)):
+            ax, below = axes[2 * j : 2 * j + 2]
             measured = (trial.motion.tau[inside] * missing)[:, j]
             ax.plot(*envelope(t[inside], measured), color=MEASURED, linewidth=2.0, label="measured")
+            below.axhline(0.0, color=MEASURED, linewidth=0.8)
             for k, (label, tau) in enumerate(zip(look, trial.taus, strict=True)):
+                estimate = (tau[inside] * missing)[:, j]
                 style = {key: value for key, value in look[label].items() if key != "marker"}
-                x, y = envelope(t[inside], (tau[inside] * missing)[:, j])
+                x, y = envelope(t[inside], estimate)
                 ax.plot(
                     x,
                     y,
@@ -151,10 +155,60 @@ def forces(result: ComparisonResult, trial: ComparedLog, start_s: float | None) 
                     label=label,
                     **style,
                 )
-            _frame(ax, trial.motion.tau[inside][trial.rows[inside], j], trial.taus[:, inside][:, trial.rows[inside], j])
+                below.plot(*envelope(t[inside], measured - estimate), **style)
+            tau = trial.motion.tau[known, j]
+            _frame(ax, tau, trial.taus[:, known, j])
+            _frame(below, np.zeros_like(tau), tau - trial.taus[:, known, j])
             ax.set_ylabel(f"{AXES[j]} {SYMBOLS[j]} [{UNITS[j]}]")
+            below.set_ylabel(f"residual [{UNITS[j]}]")
         axes[-1].set_xlabel("time [s]")
         legend_above(figure, axes[0], 3)
+        return svg_text(figure)
+
+
+def runs_to_draw(log: ComparedLog) -> list[int]:
+    """Return the free runs with the least, the median and the greatest error of position, of those that all models finish."""
+    if not log.paths.size or not log.motion.sway_measured:
+        return []
+    runs = np.isfinite(log.paths).any(axis=(1, 2, 3))
+    if not runs.any():
+        return []
+    seen = np.isfinite(log.paths[runs]).all(axis=3)
+    # The longest that any run gets, which is the same for most.
+    length = seen.all(axis=0).sum(axis=1)
+    whole = np.flatnonzero(length == length.max(initial=0))
+    end = int(length.max(initial=0)) - 1
+    if end < 1:
+        return []
+    measured = log.motion.eta[log.path_rows[whole, end], :2]
+    error = np.hypot(*np.moveaxis(log.paths[runs][:, whole, end] - measured, 2, 0)).mean(axis=0)
+    order = whole[np.argsort(error, kind="stable")]
+    return list(dict.fromkeys(int(order[k]) for k in (0, len(order) // 2, len(order) - 1)))
+
+
+def free_run_tracks(result: ComparisonResult, log: ComparedLog, runs: Sequence[int]) -> str:
+    """Where the vessel went in some free runs, and where each model takes it from the same start; north up."""
+    look = looks(result.models)
+    with mpl.rc_context(STYLE):
+        figure = margins(3.4, top=0.5 + 0.2 * ((len(look) + 3) // 3), between=(0.35, 0.12))
+        panels = figure.subplots(1, len(runs), squeeze=False)[0]
+        for ax, run in zip(panels, runs, strict=True):
+            whole: Flags = np.asarray(np.isfinite(log.paths[:, run]).all(axis=2))
+            rows = log.path_rows[run, whole.any(axis=0)]
+            north, east = log.motion.eta[rows, :2].T
+            ax.plot(east, north, color=MEASURED, linewidth=2.0, label="measured")
+            ax.plot(east[:1], north[:1], "o", color=MEASURED, markersize=4)
+            for label, places, known in zip(look, log.paths[:, run], whole, strict=True):
+                if known.any():
+                    style = {key: value for key, value in look[label].items() if key != "marker"}
+                    ax.plot(*places[known, ::-1].T, label=label, **style)
+                    ax.plot(*places[known][-1:, ::-1].T, look[label]["marker"], color=style["color"], markersize=4)
+            ax.set_aspect("equal", adjustable="datalim")
+            start, end = log.motion.t[rows[[0, -1]]]
+            ax.set_title(f"{start:.0f} to {end:.0f} s")
+            ax.set_xlabel("east [m]")
+        panels[0].set_ylabel("north [m]")
+        legend_above(figure, panels[0], 4)
         return svg_text(figure)
 
 

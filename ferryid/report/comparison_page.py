@@ -35,8 +35,11 @@ def render(
     sections: list[dict[str, Any]] = []
     for on, title, scope in ordered:
         place = next((k for k, one in enumerate(logs[:MAX_LOGS]) if one.name == on), None)
+        heads, outcome_rows = comparison_words.outcomes(result, on)
         sections.append(
             {
+                "outcome_heads": heads,
+                "outcomes": outcome_rows,
                 "title": title,
                 "about": comparison_words.about(scope),
                 "heads": comparison_words.score_columns(scope),
@@ -97,14 +100,26 @@ def _overall(
 def _figures(result: ComparisonResult, log: ComparedLog) -> list[dict[str, Any]]:
     start = worst_minute(log.motion, log.taus, log.rows, comparison_figures.MINUTE_S)
     which = "This log" if start is None else f"The minute in which the models err most, from {start:.0f} s"
-    return [
+    found: list[dict[str, Any]] = [
         {
             "file": f"forces-{log.name}" + ("" if start is None else "-worst-minute"),
             "svg": comparison_figures.forces(result, log, start),
-            "caption": f"{which}: force measured at the actuators, and what each model makes of the same motion.",
+            "caption": f"{which}: force measured at the actuators, and what each model makes of the same motion; below each "
+            "the residual, measured less estimated.",
             "over_time": True,
         }
     ]
+    runs = comparison_figures.runs_to_draw(log)
+    if runs:
+        found.append(
+            {
+                "file": f"free-run-tracks-{log.name}",
+                "svg": comparison_figures.free_run_tracks(result, log, runs),
+                "caption": "Free runs from the measured state at the dot on: where the vessel went and where each model takes "
+                "it. Of all runs those with the least, the median and the greatest error of position at the end.",
+            }
+        )
+    return found
 
 
 def _row(name: str, unit: str, values: Mapping[str, Coefficient], labels: Sequence[str]) -> dict[str, Any]:

@@ -55,7 +55,10 @@ def as_text(result: ComparisonResult) -> str:
         lines += ["", f"{title}: {comparison_words.about(scope)}", *_score_table(result, scope, wide)]
         tracking = comparison_words.tracking_line(scope)
         lines += [f"  {tracking}"] if tracking else []
-        lines += [f"  {sentence}" for sentence in comparison_words.sentences(result, on)]
+        lines += [
+            *_outcome_table(result, on),
+            *(f"  {sentence}" for sentence in comparison_words.sentences(result, on)),
+        ]
         lines += [f"  warning: {warning}" for warning in comparison_words.warnings_of(scope)]
     if result.logs:
         lines += ["", comparison_words.about_errors(result)]
@@ -92,6 +95,21 @@ def _score_table(result: ComparisonResult, scope: CommonErrors, wide: int) -> li
         shown = "".join(f"{cell:>{max(10, len(head) + 2)}}" for head, cell in zip(heads, cells, strict=True))
         lines.append(f"  {label:<{wide}}{shown}")
     return lines
+
+
+def _outcome_table(result: ComparisonResult, on: str | None) -> list[str]:
+    """Return which of every two models is better in what."""
+    heads, rows = comparison_words.outcomes(result, on)
+    if not rows or not heads:
+        return []
+    wide = max(len(pair) for pair, _ in rows) + 2
+    columns = [2 + max(len(head), *(len(cells[k]) for _, cells in rows)) for k, head in enumerate(heads)]
+    table = [("", heads), *rows]
+    lines = [
+        f"  {pair:<{wide}}" + "".join(f"{cell:<{width}}" for cell, width in zip(cells, columns, strict=True))
+        for pair, cells in table
+    ]
+    return ["", *(line.rstrip() for line in lines), ""]
 
 
 def _folder(result: ComparisonResult) -> str:

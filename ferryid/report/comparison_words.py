@@ -82,6 +82,39 @@ def sentences(result: ComparisonResult, on: str | None) -> list[str]:
     return shown + [same[0].sentence if len(same) == 1 else _together(same, labels) for same in pairs.values()]
 
 
+def outcomes(result: ComparisonResult, on: str | None) -> tuple[list[str], list[tuple[str, list[str]]]]:
+    """Return the matrix of a log, or of all: heads of the columns, and for every two models in what the first is better.
+
+    With many models each is held against the first alone.
+    """
+    told = [row for row in result.statements if row.on == on and row.kind in (_on_axes(result, on), "free run")]
+    columns = list(dict.fromkeys((row.what, row.horizon_s) for row in told))
+    heads = [what if horizon is None else f"{what}, free {horizon:g} s" for what, horizon in columns]
+    labels = result.labels
+    # The base model is what a model is held against.
+    pairs = [(one, other) for j, one in enumerate(labels) for other in labels[:j]]
+    pairs = [(other, one) if one == BASE else (one, other) for one, other in pairs]
+    if len(labels) >= MANY:
+        pairs = [pair for pair in pairs if labels[0] in pair]
+    found = {(frozenset((row.first, row.second)), (row.what, row.horizon_s)): row for row in told}
+    rows = []
+    for one, other in pairs:
+        cells = [_outcome(found.get((frozenset((one, other)), column)), one) for column in columns]
+        rows.append((f"{one} against {other}", cells))
+    return heads, rows
+
+
+def _outcome(row: Statement | None, label: str) -> str:
+    """Return what a statement says of one of its models, in two words."""
+    if row is None or not isfinite(row.ratio):
+        return "–"
+    which = "better" if row.first == label else "worse"
+    if row.better or row.perhaps:
+        says = which if row.better else f"may be {which}"
+        return says if row.evidence else f"{says}, no evidence"
+    return "no difference" if isfinite(row.low) else "too little data"
+
+
 def _on_axes(result: ComparisonResult, on: str | None) -> str:
     """Return the kind of the statements on axes that count: of accelerations in windows, of forces where no window fits."""
     scope = next(scope for key, _, scope in scopes(result) if key == on)

@@ -66,11 +66,13 @@ def spectral(finding: Finding) -> bool:
 
 
 def in_frequency(finding: Finding) -> str:
-    """Draw the power spectrum of what was left over, and the one that a disturbance has by its parameters."""
+    """Draw the power spectrum of what is left over without and with a disturbance, and the one that it has itself."""
     evidence = finding.evidence
+    rest = evidence["before"] - evidence["explained"]
     with styled():
         figure, (ax,) = canvas(1, 3.4)
-        ax.plot(evidence["frequency"], evidence["before"], color=BASE, label="left over")
+        ax.plot(evidence["frequency"], evidence["before"], color=BASE, label=WITHOUT)
+        ax.plot(evidence["frequency"], np.where(rest > 0.0, rest, np.nan), color=NEW, linewidth=1.0, label=WITH)
         ax.plot(evidence["frequency"], evidence["explained"], color=MEASURED, linewidth=1.5, label=FOUND)
         ax.set_xscale("log")
         ax.set_yscale("log")
@@ -79,7 +81,7 @@ def in_frequency(finding: Finding) -> str:
         ax.set_xlabel(finding.labels.get("regressor", "frequency [Hz]"))
         ax.set_ylabel(finding.labels.get("residual", "left over"))
         plain_log(ax, x=True, y=True)
-        legend_above(figure, ax, 2)
+        legend_above(figure, ax, 3)
         return svg_text(figure)
 
 

@@ -299,9 +299,10 @@ def _finding(
             {
                 "file": f"{file}-spectrum",
                 "svg": drawings.of(f"{file}-spectrum", diagnosis_figures.in_frequency, finding),
-                "caption": "Power spectrum of what is left over with the other findings, on the axis on which it acts most. "
-                "What it explains: the spectrum of a disturbance of the strength and duration that were found, averaged over "
-                "windows like the rest. Where the finding holds, orange is nowhere far below it; far above it there is more.",
+                "caption": "Power spectrum of what is left over with the other findings, on the axis on which it acts most, "
+                "and what it is less that of the disturbance. What it explains: the spectrum of a disturbance of the strength "
+                "and duration that were found, averaged over windows like the rest. Where the finding holds, orange is nowhere "
+                "far below it; far above it, where blue lies on orange, it is a small part of what is left over.",
             }
         )
     return {

@@ -10,7 +10,7 @@ from ferryid.counts import counted
 from ferryid.diagnose import JUDGING, UNKNOWN, Diagnosis, Estimate, Finding, worse_axes
 from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS
-from ferryid.effects.wording import listed, timed, titled
+from ferryid.effects.wording import listed, parameter_word, timed, titled
 from ferryid.report import least_sizes
 from ferryid.report.diagnosis_errors import fitted, ratio_of
 from ferryid.types import AXES
@@ -37,17 +37,6 @@ SIGN = (
     "sign turned round."
 )
 UNITS = {"surge": "N", "sway": "N", "yaw": "N·m"}
-NAMES = {
-    "seconds": "delay",
-    "per_mps": "loss by the speed of the inflow",
-    "std": "standard deviation",
-    "force_std": "standard deviation of the force",
-    "moment_std": "standard deviation of the moment",
-    "onset": "it began at",
-    "offset": "it ended at",
-    "growth": "strength at the end of the log over that at its start",
-}
-"""Parameters whose own names are no words."""
 DELAYS = {
     "clock_offset": ("the position after the velocity", "the velocity after the position"),
     "time_delay": ("the navigation's data after the actuators'", "the actuators' data after the navigation's"),
@@ -162,6 +151,11 @@ def numbers_of(parameters: Mapping[str, Estimate], effect: str = "") -> str:
     return "; ".join(f"{name} {estimate(one)}" for name, (one,) in every)
 
 
+def positive_words(effect: str) -> str:
+    """Return what a positive delay of an effect says is late, as a sentence; empty for an effect that is no delay."""
+    return f"Positive: {DELAYS[effect][0]}." if effect in DELAYS else ""
+
+
 def in_words(effect: str, name: str, every: Sequence[Estimate]) -> tuple[str, list[Estimate]]:
     """Return the name of a parameter of some logs, and its values: delays say what is late, and are positive then."""
     if name != "seconds" or effect not in DELAYS:
@@ -218,9 +212,27 @@ def where(finding: Finding) -> str:
         told += f"{', and' if told else 'It'} shows in {listed(shown)}"
     if finding.band_hz is not None:
         told += f", mostly between {finding.band_hz[0]:g} and {finding.band_hz[1]:g} Hz"
+    told += power_share(finding)
     # Where the vessel was while something passed is no property of it.
     regime = "" if finding.regime == EVERYWHERE or finding.ends else finding.regime
     return f"{told}; clearest at {regime}." if regime else f"{told}." if told else ""
+
+
+def power_share(finding: Finding) -> str:
+    """Return how much of the power left over the spectrum of a disturbance is, where it has half of its peak or more.
+
+    As the end of a sentence; empty for what has no spectrum.
+    """
+    evidence = finding.evidence
+    if not all(len(evidence.get(name, ())) > 1 for name in ("frequency", "before", "explained")):
+        return ""
+    frequency, explained, before = (evidence[name] for name in ("frequency", "explained", "before"))
+    strong = explained >= 0.5 * explained.max()
+    low, high = frequency[strong][[0, -1]]
+    share = min(1.0, float(explained[strong].sum() / max(before[strong].sum(), 1e-300)))
+    band = f"below {high:.2g} Hz" if strong[0] else f"{low:.2g} to {high:.2g} Hz"
+    axis = max(finding.axes, key=lambda one: finding.axes[one])
+    return f"; where it is strongest, {band}, it is {_percent(share)} of the power left over in {axis}"
 
 
 def _throughout(finding: Finding) -> bool:
@@ -504,7 +516,7 @@ def _odds(delta: float) -> str:
 
 def word(name: str) -> str:
     """Return the name of a parameter for people."""
-    return name if name in COEFFICIENTS else NAMES.get(name, name.replace("_", " "))
+    return name if name in COEFFICIENTS else parameter_word(name)
 
 
 def _inline(name: str) -> str:

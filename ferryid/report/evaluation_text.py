@@ -9,7 +9,7 @@ import numpy as np
 from ferryid.report.scale import scale_words
 from ferryid.types import AXES
 
-_ROWS = ("MSE over the base model's", "rms error, {} [N, N, N·m]", "R², model")
+_ROWS = ("row by row, MSE / base", "  rms error, {} [N, N, N·m]", "  R², model")
 _WINDOWS = ("squared prediction error / base", "  rms, {} [N, N, N·m]", "  R², model")
 HULL = "the profile's hull"
 _BESIDE_HULL = "  squared error / profile's hull"
@@ -31,19 +31,20 @@ def render_evaluation(result: dict[str, Any]) -> str:
     entries = [*result["logs"], {"name": "all logs", **result["pooled"]}] if len(result["logs"]) > 1 else result["logs"]
     for entry in entries:
         lines.append(entry["name"])
-        lines.extend(_score_lines(entry, _ROWS))
-        if "prediction" in entry:
-            lines.extend(_prediction_lines(entry["prediction"]))
+        # A fit is judged by its predictions: they stand first, and the noisier errors of single rows below them.
         beside_hull = entry.get("prediction_beside_hull", {"windows": 0})
-        if beside_hull["windows"]:
-            lines.extend(_beside_hull_lines(beside_hull))
-        if "free_run" in entry:
-            lines.extend(_free_run_lines(entry["free_run"]))
-        lines.append(f"  {_verdict(entry, 'mean square force error')}")
         if entry.get("prediction", {}).get("windows"):
             lines.append(f"  {_verdict(entry['prediction'], 'squared prediction error in windows')}")
         if beside_hull["windows"]:
             lines.append(f"  {_verdict(beside_hull, 'squared prediction error in windows', HULL)}")
+        lines.append(f"  {_verdict(entry, 'mean square force error, row by row')}")
+        if "prediction" in entry:
+            lines.extend(_prediction_lines(entry["prediction"]))
+        if beside_hull["windows"]:
+            lines.extend(_beside_hull_lines(beside_hull))
+        if "free_run" in entry:
+            lines.extend(_free_run_lines(entry["free_run"]))
+        lines.extend(_score_lines(entry, _ROWS))
         applied = entry.get("effects", {"vessel": (), "conditions": (), "left_out": ()})
         lines.extend(f"  acts, as in every log: {one['says']}" for one in applied["vessel"])
         lines.extend(f"  acts, as in this log: {one['says']}" for one in applied["conditions"])
@@ -85,14 +86,17 @@ def _beside_hull_lines(scores: dict[str, Any]) -> list[str]:
 
 def _explained(window_s: float, diagnosed: bool) -> list[str]:
     """Return what the two kinds of errors are, as lines; the base of a diagnosed model sees all that was measured."""
-    lines = [
-        "MSE, rms error: the applied force estimated row by row from the motion, against the measured one. The noise of the",
-        "  differentiated velocity is in it, and is the most of it in many logs. It is in the model's own thrust: one that",
-        "  takes thrusters and hull for half as much moves alike, with half that error.",
+    predicted = [
         "prediction error: the acceleration predicted from force and velocity, against the measured one, averaged over",
         f"  windows of {window_s:.3g} s, as force on the base model's mass, as fit judges. Little of the noise is in it.",
     ]
-    return lines if diagnosed else [*lines, "  The base model is without measured wind, current and payload there."]
+    return [
+        *predicted,
+        *([] if diagnosed else ["  The base model is without measured wind, current and payload there."]),
+        "row by row: the applied force estimated from the motion, against the measured one. The noise of the differentiated",
+        "  velocity is in it, and is the most of it in many logs. It is in the model's own thrust: one that takes thrusters",
+        "  and hull for half as much moves alike, with half that error.",
+    ]
 
 
 def _verdict(entry: dict[str, Any], error: str, base: str = "its base model") -> str:
@@ -105,7 +109,7 @@ def _verdict(entry: dict[str, Any], error: str, base: str = "its base model") ->
     better = mean < 1.0
     # Hardly any error is left, but some.
     digits = 1 if 0.0 < mean < 0.005 else 0
-    told = f"{abs(mean - 1.0):.{digits}%} {'better' if better else 'worse'} than {base} here ({error})"
+    told = f"{100.0 * abs(mean - 1.0):.{digits}f} % {'better' if better else 'worse'} than {base} here ({error})"
     if not worse:
         return told
     if len(worse) == len(AXES):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -70,19 +71,21 @@ def _timeline(
     if len(motion.t) < 2:
         return None
     known = np.where(rows[:, None], 1.0, np.nan)
-    strips = [
-        Strip(
-            f"{AXES[j]} {SYMBOLS[j]} [{UNITS[j]}]",
-            (
-                Trace("measured", (motion.tau * known)[:, j], "measured"),
-                *(
-                    Trace(label, (tau * known)[:, j], colour, framing=framing, dash=dash)
-                    for label, (tau, colour, dash, framing) in estimates.items()
-                ),
-            ),
+    strips: list[Strip] = []
+    for j in range(len(AXES)):
+        traces = [
+            Trace(label, (tau * known)[:, j], colour, framing=framing, dash=dash)
+            for label, (tau, colour, dash, framing) in estimates.items()
+        ]
+        strips.append(
+            Strip(
+                f"{AXES[j]} {SYMBOLS[j]} [{UNITS[j]}]",
+                (Trace("measured", (motion.tau * known)[:, j], "measured"), *traces),
+            )
         )
-        for j in range(len(AXES))
-    ]
+        if residual is None:
+            left = tuple(replace(one, values=(motion.tau * known)[:, j] - one.values) for one in traces)
+            strips.append(Strip(f"{AXES[j]} {SYMBOLS[j]}, residual [{UNITS[j]}]", left))
     nu = motion.nu * known
     strips += [
         Strip(

@@ -80,18 +80,22 @@ def render_model(model: Model) -> str:
         + ", ".join(f"{axis} {_number(value)}" for axis, value in zip(AXES, ratio, strict=True))
         + ")",
         *_equations(model),
-        "",
-        "correction of the base model, term by term, as the model file has it (95 % intervals)",
-        f"{'term':<{wide}}{'axis':<7}{'value':>13}{'low':>13}{'high':>13}  unit",
     ]
-    for axis in AXES:
-        for term, entry in data["coefficients"][axis].items():
-            if entry["value"] == 0.0 and entry["low"] == 0.0 and entry["high"] == 0.0:
-                continue
-            lines.append(
-                f"{term:<{wide}}{axis:<7}{entry['value']:>13.5g}{entry['low']:>13.5g}{entry['high']:>13.5g}  {entry['unit']}"
-            )
-    if model.hull:
+    corrected = [
+        f"{term:<{wide}}{axis:<7}{entry['value']:>13.5g}{entry['low']:>13.5g}{entry['high']:>13.5g}  {entry['unit']}"
+        for axis in AXES
+        for term, entry in data["coefficients"][axis].items()
+        if any(entry[each] != 0.0 for each in ("value", "low", "high"))
+    ]
+    # A model of a diagnosis may have no terms: its coefficients are those of the equations above, and no more.
+    if corrected:
+        lines += [
+            "",
+            "correction of the base model, term by term, as the model file has it (95 % intervals)",
+            f"{'term':<{wide}}{'axis':<7}{'value':>13}{'low':>13}{'high':>13}  unit",
+            *corrected,
+        ]
+    if model.hull and corrected:
         lines += ["", f"{'hull':<14}{'value':>20}{'low':>13}{'high':>13}  unit"]
         for name, one in model.hull.items():
             lines.append(f"{name:<14}{one.value:>20.5g}{one.low:>13.5g}{one.high:>13.5g}  {one.unit}")

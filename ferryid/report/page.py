@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
+from shlex import split
 from typing import Any
 
 import numpy as np
@@ -18,9 +19,10 @@ from ferryid.report.drawings import NONE, Drawings
 from ferryid.report.fit_timeline import fit_timeline
 from ferryid.report.folder import made
 from ferryid.report.headline import headline_of
-from ferryid.report.html import template
+from ferryid.report.html import template, with_contents
 from ferryid.report.interactive import STATIC, Interactive, interactive_of
 from ferryid.report.left_out import left_out_table
+from ferryid.report.next_steps import after_fit
 from ferryid.report.structure import remainder, worst_and_best_minute
 from ferryid.types import AXES, Floats
 from ferryid.vessel import parse_profile
@@ -75,7 +77,10 @@ def render(
     `origin` is what `ferryid.report.folder.made` returns, and `drawings` are those that exist already.
     """
     context = {**_context(result, interactive, drawings), "made": origin}
-    return template("fit.html").render(context), dict(_drawings(context))
+    files = [name for log in result.model.training for name in log["files"]]
+    command = split((origin or {}).get("command", ""))
+    context["next"] = after_fit(result.model.label, result.acceptance.accepted, files, command)
+    return with_contents(template("fit.html").render(context)), dict(_drawings(context))
 
 
 def _drawings(part: Any) -> Iterator[tuple[str, str]]:

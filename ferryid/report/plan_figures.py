@@ -177,7 +177,7 @@ def _deviations(ax: Axes, plan: Plan) -> None:
     ax.xaxis.set_minor_locator(NullLocator())
     ax.set_yticks(y, [one.name for one in plan.hull])
     ax.set_ylim(len(y) - 0.4, -0.6)
-    ax.set_xlabel("standard deviation expected, of that now")
+    ax.set_xlabel("expected standard deviation, relative to the present one")
     ax.set_title("What remains unknown of the hull's coefficients", pad=24)
     ax.legend(
         loc="lower left", bbox_to_anchor=(-0.02, 1.0), ncols=2, borderaxespad=0.1, columnspacing=1.2, handletextpad=0.3

@@ -76,11 +76,13 @@ def worst_and_best_minute(log: LogFit, length_s: float = 60.0) -> tuple[float, f
     """Return the start times [s] of the minutes with the largest and smallest error of the new model.
 
     The error is the squared residual over the variance of the measured force, averaged over the axes; validation rows are
-    preferred, and a minute counts when hardly a row of it is missing.
+    preferred, and a minute counts when hardly a row of it is missing. None where those two overlap.
     """
     allowed = log.motion.valid & np.isfinite(log.motion.tau).all(axis=1) & np.isfinite(log.tau_model).all(axis=1)
     ordered = _minutes(log.motion, log.tau_model[None], allowed, log.validation & allowed, length_s)
-    return None if ordered is None else (float(ordered[-1]), float(ordered[0]))
+    if ordered is None or abs(ordered[0] - ordered[-1]) < length_s:
+        return None
+    return float(ordered[-1]), float(ordered[0])
 
 
 def worst_minute(motion: Motion, taus: Floats, rows: Flags, length_s: float = 60.0) -> float | None:

@@ -17,8 +17,9 @@ from ferryid.identify.sweeps import (
     sweep_structures,
 )
 from ferryid.report.folder import made
-from ferryid.report.html import template
+from ferryid.report.html import template, with_contents
 from ferryid.report.interactive import STATIC, Interactive
+from ferryid.report.next_steps import after_sweep
 from ferryid.report.outcome import Report
 from ferryid.report.structures_figures import forest
 from ferryid.report.structures_text import count_terms, render_structures, supported_structure
@@ -74,7 +75,7 @@ def render(
         }
         for place, (key, one) in enumerate(found.by.items())
     ]
-    plain = structures_json(found)
+    plain, best = structures_json(found), found.by["blocks"].supported
     page = template("structures.html").render(
         made=made(command),
         assets=interactive.assets,
@@ -90,8 +91,11 @@ def render(
         test_window_s=f"{plain['test_window_s']:g}",
         settings=plain["settings"],
         found=found,
+        next=after_sweep(
+            ("--basis", best.basis, "--structure", best.structure), found.by["blocks"].any_beats_base, command
+        ),
     )
-    return page, drawings
+    return with_contents(page), drawings
 
 
 def _rows(one: StructureComparison) -> list[dict[str, Any]]:

@@ -9,12 +9,18 @@ from ferryid.types import AXES
 
 def supported_structure(one: StructureComparison) -> str:
     """Return in a sentence which structures the data support."""
+    if not one.any_beats_base:
+        return f"No structure beats the base model: keep it as it is. Of the structures alone, {_supported(one, 'the')}"
+    return _supported(one, "The")
+
+
+def _supported(one: StructureComparison, the: str) -> str:
     kept = [structure for structure in one.structures if structure.kept]
     supported, count = one.supported, len(one.structures)
     size = counted(supported.coefficients, "free coefficient")
     if len(kept) == 1:
         return (
-            f"The data support {supported.title}, with {size}: at 95 % it is better than every other of "
+            f"{the} data support {supported.title}, with {size}: at 95 % it is better than every other of "
             f"{counted(count, 'structure')}."
         )
     which = (
@@ -22,7 +28,7 @@ def supported_structure(one: StructureComparison) -> str:
         if len(kept) == count
         else f"the {len(kept)} of {counted(count, 'structure')} that are not significantly worse than the best at 95 %"
     )
-    return f"The data support {supported.title}, with {size}: the fewest of {which}."
+    return f"{the} data support {supported.title}, with {size}: the fewest of {which}."
 
 
 def render_structures(found: StructureSweep) -> str:

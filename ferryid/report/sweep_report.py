@@ -8,11 +8,12 @@ from typing import Any
 from ferryid.identify import FOLDS, FitSettings
 from ferryid.identify.sweeps import BY, Sweep, sweep_json, sweep_settings
 from ferryid.report.folder import PAGE, made, write_folder
-from ferryid.report.html import template
+from ferryid.report.html import template, with_contents
 from ferryid.report.interactive import STATIC, Interactive, make_interactive
+from ferryid.report.next_steps import after_sweep
 from ferryid.report.outcome import Report
 from ferryid.report.sweep_figures import curves, heat_cells, heat_map
-from ferryid.report.sweep_text import headline, render_sweep
+from ferryid.report.sweep_text import fit_with, headline, render_sweep
 from ferryid.report.sweep_timeline import sweep_timeline
 from ferryid.report.timeline import Timeline
 from ferryid.types import AXES, RunContext
@@ -101,6 +102,7 @@ def render(found: Sweep, command: Sequence[str] = (), interactive: Interactive =
         vessel=found.vessel,
         headline=headline(found),
         estimator=found.estimator_says,
+        fit_with=fit_with(found).partition(": ")[0],
         options=" ".join(found.fit_options),
         notes=found.notes,
         logs=[{**log, "seconds": f"{log['seconds']:.0f}"} for log in found.logs],
@@ -112,8 +114,9 @@ def render(found: Sweep, command: Sequence[str] = (), interactive: Interactive =
         tested=found.tested,
         settings={**found.settings.plain(), **found.settings.scale},
         many=len(found.windows_s) > 1,
+        next=after_sweep(found.fit_options, found.choice_beats_base, command),
     )
-    return page, drawings
+    return with_contents(page), drawings
 
 
 def _rows(found: Sweep, key: str) -> list[dict[str, Any]]:

@@ -25,12 +25,16 @@ def headline(found: Sweep) -> str:
     choice = found.choice
     ratio = choice.over_base[choice.window, choice.components - 1]
     told = ", ".join(f"{axis} {value:.3g}" for axis, value in zip(AXES, ratio, strict=True) if np.isfinite(value))
-    return f"Choice: {choice.title}. Cross-validated {found.error} over the base model's: {told}."
+    error = f"cross-validated {found.error} over the base model's: {told}."
+    if found.choice_beats_base:
+        return f"Choice: {choice.title}. {error[0].upper()}{error[1:]}"
+    beaten = "The choice does not beat" if found.any_beats_base else "No setting beats"
+    return f"{beaten} the base model: keep it as it is. Choice, were it fitted all the same: {choice.title}, {error}"
 
 
 def fit_with(found: Sweep) -> str:
     """Return the options with which a fit uses the choice."""
-    return f"Fit with: {' '.join(found.fit_options)}"
+    return f"{'Fit with' if found.choice_beats_base else 'To fit all the same'}: {' '.join(found.fit_options)}"
 
 
 def _table(found: Sweep, choice: Selection) -> list[str]:

@@ -8,6 +8,7 @@ from typing import Any
 import matplotlib as mpl
 
 from ferryid.diagnose import GROUPS, Difference, Versus
+from ferryid.effects.wording import parameter_word
 from ferryid.report.figures import BASE, MEASURED, NEW, STYLE, margins, svg_text
 
 REACH, LEAST_REACH = 3.0, 0.1
@@ -76,6 +77,6 @@ def _rows(one: Difference, verdict: str) -> list[PropertyRow]:
             # Of what acts in A relative to B, the other sign is that of B relative to A, to first order.
             sign = 1.0 if one.group == GROUPS[1] else -1.0
             value, low, high = (sign * (at - each.neutral) / each.size for at in (found.value, found.low, found.high))
-            name = f"{one.title}: {each.name.replace('_', ' ')}"
+            name = f"{one.title}: {parameter_word(each.name)}"
             rows.append(PropertyRow(name, value, min(low, high), max(low, high), verdict))
     return rows

@@ -142,7 +142,7 @@ def _row(one: Difference, selected: bool) -> dict[str, Any]:
         "title": one.title if one.group == GROUPS[1] else f"{one.title}, {one.group} relative to {one.other}",
         "parameters": [one.said(each) for each in one.candidate.parameters if each.name in one.estimates],
         "smallest": [one.seen_from(name) for name in one.smallest],
-        "evidence": f"{one.evidence:+.0f}",
+        "evidence": f"{one.evidence:+.0f}" if round(one.evidence) else "0",
         "selected": selected and not one.doubt,
         "verdict": ("hint" if one.doubt else "differs") if selected else "no difference seen",
     }

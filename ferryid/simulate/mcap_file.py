@@ -17,7 +17,19 @@ import numpy as np
 import zstandard
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, ChunkIndex, DataEnd, Footer, Header, Schema, Statistics, SummaryOffset
+from mcap.records import (
+    Channel,
+    Chunk,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+    SummaryOffset,
+)
 from numpy.typing import NDArray
 
 from ferryid.ingest.checksum import crc32
@@ -118,6 +130,7 @@ class McapFile:
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
         self._chunks: list[ChunkIndex] = []
+        self._metadata: list[MetadataIndex] = []
         self._counts: dict[int, int] = defaultdict(int)
         self._span: tuple[int, int] | None = None
         self._begin()
@@ -143,6 +156,12 @@ class McapFile:
         )
         self._add(self._channels[-1])
         return number
+
+    def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
+        """Write texts by their names, which are about the file as a whole."""
+        start, written = self._file.tell(), _packed([Metadata(metadata=dict(values), name=name)])
+        self._metadata.append(MetadataIndex(offset=start, length=len(written), name=name))
+        self._file.write(written)
 
     def _add(self, record: _Record) -> None:
         self._parts.append(_packed([record]))
@@ -259,7 +278,7 @@ class McapFile:
             channel_message_counts=self._counts,
             chunk_count=len(self._chunks),
             message_count=sum(self._counts.values()),
-            metadata_count=0,
+            metadata_count=len(self._metadata),
             message_start_time=first,
             message_end_time=last,
             schema_count=len(self._schemas),
@@ -270,7 +289,7 @@ class McapFile:
             Opcode.STATISTICS: [statistics],
             Opcode.CHUNK_INDEX: self._chunks,
             Opcode.ATTACHMENT_INDEX: [],
-            Opcode.METADATA_INDEX: [],
+            Opcode.METADATA_INDEX: self._metadata,
         }
         start, summary, offsets = self._file.tell(), b"", []
         for opcode, records in groups.items():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -17,10 +17,19 @@ from ferryid.simulate.messages import MessageTable, definition, serialised, size
 from ferryid.simulate.sensors import Stream
 
 
-def write_mcap(streams: list[Stream], path: Path, chunk_bytes: int) -> None:
-    """Write one MCAP file of CDR messages."""
+def write_mcap(
+    streams: list[Stream],
+    path: Path,
+    chunk_bytes: int,
+    *,
+    library: str = "",
+    metadata: Mapping[str, Mapping[str, str]] | None = None,
+) -> None:
+    """Write one MCAP file of CDR messages, with the name of what wrote it and records of metadata by their names."""
     with path.open("wb") as file:
-        writer = McapFile(file, profile="ros2", chunk_bytes=chunk_bytes)
+        writer = McapFile(file, profile="ros2", library=library, chunk_bytes=chunk_bytes)
+        for name, values in (metadata or {}).items():
+            writer.add_metadata(name, values)
         schemas: dict[str, int] = {}
         channels = []
         for stream in streams:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ferryid.batch.remaining import told_time
 from ferryid.batch.spread import Spread
 from ferryid.files import finite, unwritable, write_text
 from ferryid.json_record import Record
+from ferryid.validation.pace import Pace
 
 T = TypeVar("T")
 
@@ -64,6 +63,7 @@ def run_stage(
     workers: Spread,
     *,
     progress: Callable[[str], None],
+    pace: Pace | None = None,
 ) -> dict[str, Any]:
     """Do what is left of some work, and return the results of all of it by name, in the order of the work.
 
@@ -81,12 +81,15 @@ def run_stage(
         What carries it out.
     progress
         Called with what is done and the time left.
+    pace
+        Of the run whose stage this is; None where it is all there is.
     """
     done = {name: result for name, result in completed(path).items() if name in work}
     left = [name for name in work if name not in done]
     if left:
-        progress(f"{stage}: {len(done)} of {len(work)}")
-        start = time.monotonic()
+        pace = pace or Pace((stage,), len(work))
+        progress(pace.begun(stage, len(done)))
+        pace.begin()
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             file = path.open("a", encoding="utf-8")
@@ -100,7 +103,6 @@ def run_stage(
                     file.flush()
                 except OSError as error:
                     raise unwritable(path, error) from error
-                seconds = (time.monotonic() - start) / count * (len(left) - count)
-                progress(f"{stage}: {len(done)} of {len(work)}, {told_time(seconds)} left")
+                progress(pace.told(stage, len(done), count))
         progress("")
     return {name: done[name] for name in work}

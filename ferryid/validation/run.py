@@ -25,6 +25,7 @@ from ferryid.validation.case import Case
 from ferryid.validation.checkpoint import discard, run_stage
 from ferryid.validation.commitment import SEAL_FILE, commitment, publish_answers, publish_commitment, read_seal
 from ferryid.validation.interfaces import Pipeline, Trial
+from ferryid.validation.pace import Pace
 from ferryid.validation.records import CaseResult, Diagnosis, Failure
 from ferryid.validation.run_folder import RESULT_FILE, RunFolder, open_run_folder, remove_temporary
 from ferryid.validation.source_hash import source_hash
@@ -32,6 +33,7 @@ from ferryid.validation.stages import CaseFiles, LogJob, diagnose_case, evaluate
 
 SCHEMA = "ferryid.prove/1"
 SEED_BITS = 48
+WRITING, DIAGNOSING = "writing logs", "diagnosing"
 Result = TypeVar("Result", bound=Record)
 GUARD = "process"
 """What keeps the answers from a diagnosis: no answer is on disk, and its process is given log and profile alone."""
@@ -89,7 +91,8 @@ def run_validation(
         folder = open_run_folder(path, seed, _request(settings, pipeline), announce)
         # Nothing half-done is left, however this ends: by then nobody works there any more.
         last.callback(remove_temporary, path)
-        stage = partial(run_stage, workers=workers, progress=progress)
+        pace = Pace((WRITING, DIAGNOSING, *pipeline.evaluators), len(cases))
+        stage = partial(run_stage, workers=workers, progress=progress, pace=pace)
 
         answers = _answers(seed, cases, pipeline, workers, progress)
         committed = _commit(folder, answers)
@@ -97,7 +100,7 @@ def run_validation(
 
         jobs = _written_logs(stage, folder, cases, pipeline)
         lines = folder.lines("diagnosed")
-        diagnoses = _parsed(Diagnosis, lines, stage("diagnosing", lines, jobs, diagnose_case))
+        diagnoses = _parsed(Diagnosis, lines, stage(DIAGNOSING, lines, jobs, diagnose_case))
         publish_answers(path, answers, folder.salt)
 
         trials = {case.name: _trial(path, case, jobs[case.name], diagnoses[case.name]) for case in cases}
@@ -195,7 +198,7 @@ def _written_logs(stage: Any, folder: RunFolder, cases: Sequence[Case], pipeline
     # A log that somebody has removed is written again; it comes out the same.
     discard(lines, [case.name for case in cases if not (logs / case.name).is_dir()])
     work = {case.name: case for case in cases}
-    written = stage("writing logs", lines, work, partial(write_case, pipeline.generate, logs))
+    written = stage(WRITING, lines, work, partial(write_case, pipeline.generate, logs))
     return {
         name: LogJob(folder.path, folder.sources, name, files.log, files.profile, files.more)
         for name, files in _parsed(CaseFiles, lines, written).items()

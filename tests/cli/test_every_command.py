@@ -141,7 +141,7 @@ def test_ingest_fit_evaluate_compare_and_models(
     terms = {row["term"] for row in comparison["coefficients"]["terms"]}
     assert len(terms) == 21 + 3 + 1
     page = Path(comparison["report"]).read_text(encoding="utf-8")
-    assert page.count("<svg") == 2 + 2
+    assert page.count("<svg") == 2 + 2 * 2
     assert needs_nothing(page)
     conforms((Path(comparison["report"]).parent / "compare.json").read_text(encoding="utf-8"))
     alone = conforms(ferryid("compare", "milliampere@1", "milliampere@2", "--out", out, "--json", "-").out)

@@ -19,7 +19,9 @@ from ferryid.models.prediction.log_prediction import predict
 from ferryid.models.prediction.window_averages import window_errors
 from ferryid.models.scores import usable_rows
 from ferryid.report import comparison_words
-from ferryid.report.comparison_figures import over_reference
+from ferryid.report.comparison_figures import looks, over_reference, runs_to_draw
+from ferryid.report.comparison_page import render
+from ferryid.report.fit_timeline import comparison_timeline
 from ferryid.signals.prepare import prepare
 from ferryid.simulate import load_scenario, simulate, write_log
 from ferryid.types import RunContext
@@ -176,6 +178,44 @@ def test_blocks_of_free_runs_are_twice_as_long_as_a_run(compared: Comparison) ->
     blocks = compared.result.logs[0].free_run.blocks
     for horizon, count in zip((5.0, 10.0, 20.0, 30.0, 60.0), blocks, strict=True):
         assert count == pytest.approx((SECONDS[0] - horizon) / max(30.0, 2.0 * horizon), abs=1.0)
+
+
+def test_paths_of_free_runs_end_as_far_off_as_their_errors_say(compared: Comparison) -> None:
+    log = compared.logs[0]
+    h = compared.result.logs[0].free_run.horizons_s.index(30.0)
+    step_s = (log.path_rows[0, 1] - log.path_rows[0, 0]) / log.motion.rate_hz
+    k = round(30.0 / step_s)
+    measured = log.motion.eta[log.path_rows[:, k], :2]
+    astray = np.hypot(*np.moveaxis(log.paths[:, :, k] - measured, 2, 0))
+    got_there = log.reached[:, h]
+    np.testing.assert_allclose(astray[:, got_there], log.errors[:, got_there, h, 0], rtol=1e-9)
+    assert np.isnan(astray[:, ~got_there]).all()
+
+
+def test_the_runs_that_are_drawn_err_least_most_and_between(compared: Comparison) -> None:
+    log = compared.logs[0]
+    runs = runs_to_draw(log)
+    assert len(runs) == 3
+    error = log.errors[:, runs, -1, 0].mean(axis=0)
+    assert (np.diff(error) > 0.0).all()
+    every = log.errors[:, log.reached[:, -1], -1, 0].mean(axis=0)
+    assert (error[0], error[2]) == (every.min(), every.max())
+    assert runs_to_draw(replace(log, paths=np.full_like(log.paths, np.nan))) == []
+    page, drawings = render(compared.result, compared.logs, {"date": "", "version": "", "command": ""})
+    assert "free-run-tracks-trial-0" in drawings
+    assert drawings["free-run-tracks-trial-0"] in page
+    assert page.index("ferry@1 against base model") < page.index("Ratios of the errors, with intervals and p")
+
+
+def test_the_residual_of_every_model_lies_below_its_force(compared: Comparison) -> None:
+    log, models = compared.logs[0], compared.result.models
+    made = comparison_timeline(log, models, looks(models))
+    assert made is not None
+    force, residual = made.strips[:2]
+    assert (force.label, residual.label) == ("surge X [N]", "surge X, residual [N]")
+    for estimate, left in zip(force.traces[1:], residual.traces, strict=True):
+        assert (estimate.label, estimate.colour, estimate.dash) == (left.label, left.colour, left.dash)
+        np.testing.assert_allclose(left.values, force.traces[0].values - estimate.values)
 
 
 def test_a_log_with_a_reference_tells_how_it_was_kept(compared: Comparison) -> None:

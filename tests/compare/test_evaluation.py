@@ -35,19 +35,31 @@ HEAD = {"model": {"name": "ferry", "version": 1}, "window_s": 2.0}
 @pytest.mark.parametrize(
     ("ratios", "told"),
     [
-        ((0.5, 0.6, 0.7), "40% better than its base model here (mean square force error)"),
-        ((0.4, 0.5, 1.2), "30% better than its base model here (mean square force error), but worse in yaw"),
-        ((0.2, 1.2, 1.3), "10% better than its base model here (mean square force error), but worse in sway and yaw"),
-        ((0.8, 0.9, 1.6), "10% worse than its base model here (mean square force error), namely in yaw"),
-        ((1.4, 0.7, 1.5), "20% worse than its base model here (mean square force error), namely in surge and yaw"),
-        ((1.2, 1.3, 1.4), "30% worse than its base model here (mean square force error), on every axis"),
+        ((0.5, 0.6, 0.7), "40 % better than its base model here (mean square force error, row by row)"),
+        (
+            (0.4, 0.5, 1.2),
+            "30 % better than its base model here (mean square force error, row by row), but worse in yaw",
+        ),
+        (
+            (0.2, 1.2, 1.3),
+            "10 % better than its base model here (mean square force error, row by row), but worse in sway and yaw",
+        ),
+        ((0.8, 0.9, 1.6), "10 % worse than its base model here (mean square force error, row by row), namely in yaw"),
+        (
+            (1.4, 0.7, 1.5),
+            "20 % worse than its base model here (mean square force error, row by row), namely in surge and yaw",
+        ),
+        ((1.2, 1.3, 1.4), "30 % worse than its base model here (mean square force error, row by row), on every axis"),
         # Within 5 % no axis is called worse.
-        ((1.04, 1.04, 1.04), "4% worse than its base model here (mean square force error)"),
+        ((1.04, 1.04, 1.04), "4 % worse than its base model here (mean square force error, row by row)"),
         # An axis on which the base model is right cannot be judged.
-        ((np.nan, 1.2, 1.4), "30% worse than its base model here (mean square force error), namely in sway and yaw"),
+        (
+            (np.nan, 1.2, 1.4),
+            "30 % worse than its base model here (mean square force error, row by row), namely in sway and yaw",
+        ),
         ((np.nan, np.nan, np.nan), "cannot be judged: the base model makes no error here"),
         # Hardly any error is left, but some.
-        ((0.002, 0.003, 0.001), "99.8% better than its base model here (mean square force error)"),
+        ((0.002, 0.003, 0.001), "99.8 % better than its base model here (mean square force error, row by row)"),
     ],
 )
 def test_the_verdict_says_where_a_model_is_worse(ratios: tuple[float, float, float], told: str) -> None:
@@ -86,8 +98,17 @@ def test_predictions_are_judged_in_windows_as_a_fit_judges_them(fitted: FitOutco
     pooled = np.average([one["prediction"]["mse"]["model"]["yaw"] for one in told["logs"]], weights=windows)
     assert told["pooled"]["prediction"]["mse"]["model"]["yaw"] == pytest.approx(pooled)
     text = render_evaluation(told)
-    assert len(shown(text, "squared prediction error / base")) == len(shown(text, "MSE over the base model's")) == 3
+    assert len(shown(text, "squared prediction error / base")) == len(shown(text, "row by row, MSE / base")) == 3
     assert len(shown(text, "than its base model here (squared prediction error in windows)")) == 3
+    # What a fit is judged by comes first, the noisier errors of rows after it: of verdicts, figures and explanations.
+    lines = text.splitlines()
+    for predicted, of_rows in (
+        ("its base model here (squared prediction error in windows)", "(mean square force error, row by row)"),
+        ("squared prediction error / base", "row by row, MSE / base"),
+        ("prediction error: ", "row by row: "),
+    ):
+        first, second = ([k for k, line in enumerate(lines) if part in line] for part in (predicted, of_rows))
+        assert all(a < b for a, b in zip(first, second, strict=True)), (predicted, first, second)
     assert len(shown(text, "windows of 8 s, as force on the base model's mass, as fit judges.")) == 1
     assert max(len(line) for line in text.splitlines() if "warning" not in line) <= 120
 

@@ -441,3 +441,23 @@ def test_a_draft_maps_what_the_bundled_profile_maps(shared_data: Callable[[str],
 
 def _bare(profile: Profile) -> set[tuple]:
     return {(quantity, topic.strip("/"), *rest) for quantity, topic, *rest in mapped(profile.signals)}
+
+
+def test_names_that_say_nothing_are_told_what_the_motion_shows_of_them(tmp_path: Path) -> None:
+    c = sailed()
+    order = ("N", "E", "psi", "u", "v", "r", "n")
+    columns = {"t": c["t"], **{f"col{k}": c[name] for k, name in enumerate(order)}}
+    columns["col2"] = np.degrees(c["psi"]) % 360.0
+    with pytest.raises(FerryIdError) as refused:
+        draft_profile(table(tmp_path, columns))
+    told = str(refused.value)
+    assert "col5 follows the slope of col2" in told
+    assert "col3 and col4, turned by col2, follow the slopes of col0 and col1" in told
+    assert 'Fix: name the columns after what they are, as in "N [m]"' in told
+    # Along the axes of the position nothing shows which is the heading, and all three are told.
+    columns |= {"col3": np.gradient(c["N"], c["t"]), "col4": np.gradient(c["E"], c["t"])}
+    with pytest.raises(FerryIdError) as refused:
+        draft_profile(table(tmp_path, columns))
+    for rate, angle in (("col3", "col0"), ("col4", "col1"), ("col5", "col2")):
+        assert f"{rate} follows the slope of {angle}" in str(refused.value)
+    assert "turned by" not in str(refused.value)

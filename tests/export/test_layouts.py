@@ -39,7 +39,8 @@ def test_curves_are_fields_of_the_file(tmp_path: Path) -> None:
     xml, layout = (Path(place) for place in result["layouts"])
     assert (xml, layout) == layout_files(mcap)
     curves = [one.get("name") for one in ET.parse(xml).iter("curve")]
-    assert len(curves) == 3 * 4 + 3
+    assert len(curves) == 3 * 4 + 3 + 1
+    assert curves[-1] == "/ferryid/finding/wind/north/data"
     for curve in curves:
         topic = max((topic for topic in messages if curve.startswith(f"{topic}/")), key=len)
         assert has(messages[topic], curve.removeprefix(f"{topic}/").replace("/", ".")), curve
@@ -49,6 +50,7 @@ def test_curves_are_fields_of_the_file(tmp_path: Path) -> None:
         for path in [*panel.get("paths", []), *filter(None, [panel.get("xAxisPath")])]:
             topic, _, field = path["value"].partition(".")
             assert has(messages[topic], field), path
+            assert (path["timestampMethod"] == "headerStamp") == hasattr(messages[topic], "header")
     assert whole["configById"]["DiagnosticSummary!findings"]["topicToRender"] in messages
     # Another time they are replaced with the file.
     export(mcap, overwrite=True)

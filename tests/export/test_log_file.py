@@ -12,7 +12,9 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
+from scipy.spatial.transform import Rotation
 
+from ferryid import __version__
 from ferryid.errors import FerryIdError
 from ferryid.export.findings import read_diagnosis, told_by
 from ferryid.export.log_file import export_log
@@ -82,6 +84,7 @@ def test_forces_and_motion_are_those_of_the_log_at_its_times(tmp_path: Path) -> 
     assert 0 < rows.sum() < len(rows)
     assert result["rows_left_out"] == len(rows) - rows.sum()
     times = track.t0_ns + np.round(motion.t[rows] * 1e9).astype(np.int64)
+    transforms = found.pop("/tf"), found.pop("/tf_static")
     for topic, messages in found.items():
         assert [when for when, _ in messages] == times.tolist(), topic
         stamps = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for _, m in messages]
@@ -99,6 +102,36 @@ def test_forces_and_motion_are_those_of_the_log_at_its_times(tmp_path: Path) -> 
     turn = 2.0 * np.arctan2(q[:, 1], q[:, 0]) - motion.eta[rows, 2]
     np.testing.assert_allclose(np.cos(turn), 1.0, atol=1e-12)
     assert {m.header.frame_id for _, m in found["/ferryid/pose"]} == {"map_ned"}
+    # Viewers of three dimensions place the vessel by the same pose.
+    moving, lasting = [[(when, one.transforms[0]) for when, one in each] for each in transforms]
+    assert [when for when, _ in moving] == times.tolist()
+    for (_, there), pose, when in zip(moving, poses, times.tolist(), strict=True):
+        assert (there.header.frame_id, there.child_frame_id) == ("map_ned", "base_link_frd")
+        assert there.header.stamp.sec * 10**9 + there.header.stamp.nanosec == when
+        assert (there.transform.translation.x, there.transform.translation.y) == (pose.position.x, pose.position.y)
+        turned, heading = there.transform.rotation, pose.orientation
+        assert (turned.x, turned.y, turned.z, turned.w) == pytest.approx((0.0, 0.0, heading.z, heading.w), abs=1e-12)
+    ((_, there),) = lasting
+    assert (there.header.frame_id, there.child_frame_id) == ("map", "map_ned")
+    turned = there.transform.rotation
+    to_map = Rotation.from_quat([turned.x, turned.y, turned.z, turned.w])
+    # North is the y of ROS, east its x, and down is against its z.
+    np.testing.assert_allclose(to_map.apply(np.eye(3)), [[0, 1, 0], [1, 0, 0], [0, 0, -1]], atol=1e-12)
+
+
+@pytest.mark.slow
+def test_a_viewer_is_told_what_made_it_of_what(tmp_path: Path) -> None:
+    mcap = tmp_path / "view.mcap"
+    export(mcap)
+    with mcap.open("rb") as file:
+        reader = make_reader(file)
+        assert reader.get_header().library == f"ferryid {__version__}"
+        (about,) = reader.iter_metadata()
+    assert about.name == "ferryid"
+    assert about.metadata == {
+        "version": __version__, "vessel": "milliampere", "model": MODEL.label, "log": "short",
+        "log_sha256": prepared(tmp_path / "out").recording.sha256, "window_s": "1", "smoother": "square",
+    }  # fmt: skip
 
 
 @pytest.mark.slow
@@ -142,9 +175,33 @@ def test_findings_stand_at_their_times(tmp_path: Path) -> None:
     ]
     values = {one.key: one.value for one in messages[0][1].status[1].values}
     assert values["north"] == "-3 m/s (-3.2 to -2.8)"
+    assert values["probability"] == "0.98"
     assert values["held-out error removed, sway"] == "unknown"
     assert values["not separated from"] == "current"
     assert messages[0][1].status[0].hardware_id == "milliampere"
+
+
+@pytest.mark.slow
+def test_findings_can_be_plotted(tmp_path: Path) -> None:
+    told = tmp_path / "diagnosis.json"
+    some = finding("payload", [[30.5, 60.25]], probability=0.9999, onset=30.5, offset=60.25)
+    some["instance"] = "aft deck"
+    some["parameters"]["onset"] = {"value": 30.5, "low": 30.0, "high": 31.0, "unit": "s"}
+    told.write_text(json.dumps(diagnosis(some)), encoding="utf-8")
+    mcap = tmp_path / "view.mcap"
+    export(mcap, diagnosis=told)
+    found, log = read(mcap), prepared(tmp_path / "out")
+    assert [topic for topic in found if topic.startswith("/ferryid/finding/")] == [
+        "/ferryid/finding/payload/aft_deck/north"
+    ]
+    messages = found["/ferryid/finding/payload/aft_deck/north"]
+    at = np.array([when - log.track.t0_ns for when, _ in messages]) / 1e9
+    np.testing.assert_allclose(at, [*range(90), 89.8])
+    acts = (at >= 30.5) & (at <= 60.25)
+    np.testing.assert_array_equal([one.data for _, one in messages], np.where(acts, -3.0, np.nan))
+    (status,) = found["/diagnostics"][1][1].status
+    # As the report says it: a probability of 1 nobody has.
+    assert {one.key: one.value for one in status.values}["probability"] == "above 0.99"
 
 
 @pytest.mark.slow

@@ -14,6 +14,7 @@ from ferryid.errors import FerryIdError
 from ferryid.identify import inputs
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.sweeps.settings_sweep import Sweep, sweep_json, sweep_settings
+from ferryid.identify.sweeps.swept import beats_base
 from ferryid.report.sweep_text import headline, render_sweep
 from ferryid.signals.copies import GivenLogs
 from ferryid.signals.prepare import Opened, open_track
@@ -102,6 +103,35 @@ def test_notes(run: Run) -> None:
     assert "The window chosen is the longest that was tried." in ends.notes
     commanded = run("components", [replace(log, tau_d=log.tau)], replace(SETTINGS, residual="commanded"))
     assert "Fitted to the commanded residual, tested against measured force." in commanded.notes
+
+
+@pytest.mark.slow
+def test_a_sweep_that_loses_to_the_base_model_recommends_none(run: Run) -> None:
+    """Where the base model is true, every correction only adds noise."""
+    found = run("components", [measured(3, seconds=300.0, noise=200.0)], FitSettings(estimator="derivative"))
+    assert not found.any_beats_base
+    assert not sweep_json(found)["beats_base"]
+    told = render_sweep(found)
+    assert told.startswith("No setting beats the base model: keep it as it is. Choice, were it fitted all the same:")
+    assert "\nTo fit all the same: --estimator" in told
+    wrong = run("components", [measured(3, noise=5.0)])
+    assert wrong.choice_beats_base
+    assert sweep_json(wrong)["beats_base"]
+    assert render_sweep(wrong).startswith("Choice: ")
+
+
+@pytest.mark.parametrize(
+    ("ratios", "beats"),
+    [
+        ([0.9, 1.05, 1.0], True),
+        ([1.2, 0.9, 1.0], False),
+        ([np.nan, 0.9, 1.0], True),
+        ([np.nan, np.nan, 1.0], False),
+        ([np.nan] * 3, False),
+    ],
+)
+def test_the_base_model_is_beaten_on_average_over_the_axes_on_which_it_errs(ratios: list[float], beats: bool) -> None:
+    assert beats_base(np.array(ratios)) == beats
 
 
 def test_what_is_told_is_what_was_found(run: Run) -> None:

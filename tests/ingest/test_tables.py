@@ -423,6 +423,7 @@ def test_reading_twice_does_not_count_twice(tmp_path: Path) -> None:
         ("a.csv", "time,u\n", TableLayout(time="time"), "header and no rows"),
         ("a.txt", "Dear all,\nthe trial went well,\nregards\n", None, "not a table"),
         ("a.csv", "a,b\n1,2\n1,2\n", None, "looks like a time"),
+        ("a.csv", "c,d\n0.5,2\n1,1\n1.5,3\n", None, "it may be c (by 0.5), which rises from row to row. Fix: "),
         ("a.csv", "time,u\n0,1\n1,2\n", TableLayout(time="tiem"), 'Did you mean "time"?'),
         ("a.csv", "time;u\n0;1\n1;2\n", TableLayout(time="time"), "separator"),
         ("a.csv", "time,u\n0,1\n1,2\n", TableLayout(time="c", columns=("a", "b", "c")), "3 column names but 2 fields"),

@@ -233,3 +233,17 @@ def test_a_model_is_shown_by_its_equations_of_motion_beside_the_base_model() -> 
     assert float(value) - float(base) == pytest.approx(added, rel=1e-3, abs=0.1)
     assert float(change) == pytest.approx(100.0 * added / float(base), abs=0.06)
     assert lines.index(row) < next(k for k, line in enumerate(lines) if line.startswith("term "))
+
+
+def test_a_model_without_a_correction_has_no_table_of_one() -> None:
+    """That of a diagnosis may have none: its coefficients are those of the equations of motion."""
+    nothing, none = np.zeros_like(made().theta), np.zeros(3)
+    bare = replace(
+        made(), theta=nothing, low=nothing, high=nothing, intercept=none, intercept_low=none, intercept_high=none
+    )
+    lines = render_model(bare).splitlines()
+    assert "correction of the base model" not in "".join(lines)
+    heads = [k for k, line in enumerate(lines) if line.startswith(("term ", "hull ", "coefficient "))]
+    assert len(heads) == 1
+    assert lines[heads[0] + 1].startswith("m11 ")
+    assert any(line.startswith("term ") for line in render_model(made()).splitlines())

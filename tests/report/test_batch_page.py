@@ -91,7 +91,7 @@ def test_what_rows_say() -> None:
     assert first["cells"]["fit"].startswith("accepted")
     assert first["cells"]["fitmse"] == "0.100"
     assert first["cells"]["rms"] == "9, 9, 9"
-    assert second["cells"]["found"] == "something without a name perhaps steady wind"
+    assert second["cells"]["found"] == "something without a name; perhaps steady wind (north 1.0)"
     assert second["data"]["data-effects"].split("|")[1] == "Steady wind"
     assert second["data"]["data-verdict"] == "explained"
     # A name is no part of an address.
@@ -194,8 +194,18 @@ def test_what_was_lost_and_every_warning_stands_on_the_page() -> None:
     assert "399 of 11999 rows" in a["lost"]
     assert f"Lost: a.mcap: {EVIL}" in a["lost"]
     assert b["lost"] == ""
+    # What was cut is not done like any other.
+    assert (a["status"], b["status"]) == ("done, damaged", "done")
     assert c["lost"].startswith("unknown, 3.2 s")
     assert a["warnings"] == "1one"
     assert page.count("<details>") == 5
     assert "<script>alert" not in page
     assert 'data-key="lost" data-sort="23.200"' in page
+
+
+def test_a_delay_is_told_as_one_and_what_is_late_where_it_is_positive() -> None:
+    rows = [row(f"s/{k}.mcap", k, findings=(finding("clock_offset", seconds=0.1 * k),)) for k in range(1, 4)]
+    page = render(result(*rows, trends=trends_of(rows, PROFILES)))
+    assert ">delay</text>" in page
+    assert "Positive: the position after the velocity." in page
+    assert ">seconds" not in page

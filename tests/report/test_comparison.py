@@ -97,6 +97,30 @@ def test_what_is_not_shown_is_one_sentence_for_two_models() -> None:
     assert said.count("p 1.00") == 5
 
 
+@pytest.mark.parametrize(
+    ("p", "says"), [(0.001, "worse"), (0.03, "may be worse"), (0.5, "no difference"), (nan, "too little data")]
+)
+def test_one_matrix_says_which_of_every_two_models_is_better_in_what(p: float, says: str) -> None:
+    found = result((BASE, "one", "two"), p)
+    if isnan(p):
+        found = replace(found, statements=tuple(replace(row, low=nan, high=nan) for row in found.statements))
+    heads, rows = comparison_words.outcomes(found, "log")
+    assert heads == ["surge", "sway", "yaw", "position, free 30 s", "heading, free 30 s"]
+    assert [pair for pair, _ in rows] == [f"one against {BASE}", f"two against {BASE}", "two against one"]
+    assert all(cells == [says] * 5 for _, cells in rows)
+
+
+def test_the_matrix_says_what_is_no_evidence_and_what_is_better() -> None:
+    rows = comparison_words.outcomes(result(("one", BASE), 0.001, frozenset({"one"})), "log")[1]
+    assert rows == [(f"one against {BASE}", ["better, no evidence"] * 5)]
+    assert comparison_words.outcomes(result(("one", BASE), 0.001), "log")[1][0][1] == ["better"] * 5
+
+
+def test_with_many_models_the_matrix_has_each_against_the_first() -> None:
+    rows = comparison_words.outcomes(result(("a", "b", "c", "d", "e"), 0.001), "log")[1]
+    assert [pair for pair, _ in rows] == [f"{one} against a" for one in "bcde"]
+
+
 def test_alike_is_what_differs_by_next_to_nothing_however_surely() -> None:
     row = result(("one", "two"), 0.0001, step=1.004).statements[0]
     assert row.better is None

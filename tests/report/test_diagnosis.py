@@ -543,8 +543,9 @@ def gusts() -> Finding:
     return replace(
         nameless(),
         effect="gusts",
+        axes=by_axis(0.1, 0.7, 0.2),
         says="The wind was gusty.",
-        evidence={"frequency": frequency, "before": explained + 50.0, "explained": explained},
+        evidence={"frequency": frequency, "before": explained + 5000.0, "explained": explained},
         labels={"residual": "sway force left over [N²/Hz]", "regressor": "frequency [Hz]"},
     )
 
@@ -555,9 +556,21 @@ def test_what_comes_and_goes_is_shown_by_its_spectrum() -> None:
     page, drawings = render((one,), "trial")
     assert {name for name in drawings if name.startswith("finding-2")} == {"finding-2-spectrum"}
     drawing = drawings["finding-2-spectrum"]
-    for label in ("frequency [Hz]", "sway force left over [N²/Hz]", "left over", "what it explains"):
+    for label in (
+        "frequency [Hz]",
+        "sway force left over [N²/Hz]",
+        "without the finding",
+        "with it",
+        "what it explains",
+    ):
         assert f">{label}</text>" in drawing
     assert "orange is nowhere far below it" in unbroken(page)
+    strong = gusts().evidence["explained"] >= 0.5 * gusts().evidence["explained"].max()
+    explained = gusts().evidence["explained"][strong]
+    share = 100.0 * explained.sum() / (explained + 5000.0).sum()
+    told = f"where it is strongest, below 0.05 Hz, it is {share:.0f} % of the power left over in sway"
+    assert told in unbroken(page)
+    assert told in unbroken(as_text((one,)))
 
 
 def unbroken(text: str) -> str:

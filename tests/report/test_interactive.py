@@ -9,10 +9,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ferryid.diagnose import Difference, Versus
+from ferryid.diagnose.data.estimate import Estimate
+from ferryid.diagnose.inference.candidate import Candidate
 from ferryid.diagnose.judging.diagnosis import Diagnosis
+from ferryid.diagnose.judging.group_differences import JudgedGroups
+from ferryid.effects import effects
 from ferryid.report.batch_page import render
 from ferryid.report.diagnosis_report import report
+from ferryid.report.versus_report import render as versus_page
 from ferryid.types import Floats
+from ferryid.vessel import load_profile
 from tests.report.browser import CHROMIUM, Page
 from tests.report.pages import NEEDS_UPLOT
 from tests.report.test_batch_page import hostile
@@ -293,3 +300,55 @@ def test_a_batch_on_paper_is_whole_and_has_no_filters(page: Page, tmp_path: Path
     cut = "[...document.querySelectorAll('.scroll')].filter((one) => one.scrollWidth > one.clientWidth + 1).length"
     assert page.do(cut) == 0
     page.send("Emulation.setEmulatedMedia", media="")
+
+
+@pytest.mark.parametrize("width", [420, 800, 1200, 1500])
+def test_the_table_of_a_batch_is_not_cut(page: Page, tmp_path: Path, width: int) -> None:
+    path = tmp_path / "index.html"
+    path.write_text(render(hostile()), encoding="utf-8")
+    page.open(path, width)
+    cut = "[...document.querySelectorAll('.scroll')].filter((one) => one.scrollWidth > one.clientWidth + 1).length"
+    assert page.do(cut) == 0
+
+
+def test_paper_keeps_headings_heads_of_tables_and_figures_whole(page: Page, written: Path) -> None:
+    page.open(written)
+    page.send("Emulation.setEmulatedMedia", media="print")
+    styles = (
+        ("h2", "breakAfter", "avoid"),
+        ("thead", "breakAfter", "avoid"),
+        ("thead", "display", "table-header-group"),
+    )
+    for selector, name, value in (*styles, ("figure", "breakInside", "avoid"), ("tr", "breakInside", "avoid")):
+        assert page.do(f"getComputedStyle(document.querySelector({selector!r})).{name}") == value, (selector, name)
+    # Two of them and their captions find room on a sheet.
+    tallest = (
+        "Math.max(...[...document.querySelectorAll('figure svg')].map((one) => one.getBoundingClientRect().height))"
+    )
+    assert page.do(tallest) <= 420.0
+    page.send("Emulation.setEmulatedMedia", media="")
+
+
+def test_a_drawing_has_the_ground_of_a_dark_page(page: Page, written: Path) -> None:
+    page.open(written, dark=True)
+    blend = "getComputedStyle(document.querySelector('figure svg')).mixBlendMode"
+    assert page.do(blend) == "screen"
+    page.theme("light")
+    assert page.do(blend) == "normal"
+
+
+def test_the_differences_of_two_groups_fold_on_a_telephone(page: Page, tmp_path: Path) -> None:
+    gain = replace(Candidate.of(effects()["thruster_gain"], "thruster1", load_profile("milliampere")), group="B")
+    one = Difference(gain, {"factor": Estimate(0.9, 0.8, 1.0, "-")}, -0.2, 0.1, {"factor": None})
+    found = Versus("ferry", {}, JudgedGroups((), (one,), (), (), 1.0), (), "", "")
+    path = tmp_path / "versus.html"
+    path.write_text(versus_page(found)[0], encoding="utf-8")
+    page.open(path, 420)
+    cells = "[...document.querySelectorAll('.differences td')].map((one) => one.getBoundingClientRect().x)"
+    # One below the other; at a desk they stand beside each other.
+    assert len(set(page.do(cells))) == 1
+    cut = "[...document.querySelectorAll('.scroll')].filter((one) => one.scrollWidth > one.clientWidth + 1).length"
+    assert page.do(cut) == 0
+    page.open(path, 1200)
+    assert len(set(page.do(cells))) == 5
+    assert page.do("document.querySelectorAll('.differences td')[3].textContent") == "0"

@@ -71,6 +71,13 @@ def test_a_log_too_short_for_minutes_has_none() -> None:
     assert worst_and_best_minute(log_with(np.ones((900, 3)))) is None
 
 
+def test_one_minute_is_not_the_worst_and_the_best() -> None:
+    log = log_with(np.ones((1300, 3)))
+    log.motion.valid[:] = False
+    log.motion.valid[100:720] = True
+    assert worst_and_best_minute(log) is None
+
+
 @pytest.mark.parametrize("rows", [1021, 1024, 1100])
 def test_autocorrelation_is_that_of_the_sums_whatever_the_number_of_rows(rows: int) -> None:
     residual = np.cumsum(np.random.default_rng(3).standard_normal((rows, 3)), axis=0)

@@ -18,6 +18,7 @@ from ferryid.simulate.mcap_file import BytesSource, McapFile, Source, TableSourc
 def filled(file: Any, publish: str, messages: int) -> None:
     """Write schemas, channels, some of which stay empty, and messages whose times are in no order."""
     chance = Random(5)
+    file.add_metadata("about", {"vessel": "ferry", "größe": "5 m"})
     schemas = [file.register_schema(name, "ros2msg", name.encode() * 20) for name in ("pkg/msg/A", "pkg/msg/Größe")]
     channels = [file.register_channel(f"/topic{k}", "cdr", schemas[k % 2]) for k in range(4)]
     for number in range(messages):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import json
+import re
 import shlex
 import signal
 import subprocess
@@ -117,7 +118,7 @@ def test_from_the_draw_to_the_scores(tmp_path: Path) -> None:
         there = {path.name for path in (out / "proof" / "logs" / one["case"]["name"]).iterdir()}
         assert len(there) == 2
         assert "vessel.toml" in there
-    assert any(stage.startswith("diagnosing: 4 of 4, 0 s left") for stage in stages)
+    assert any(re.fullmatch(r"diagnosing: 4 of 4, stage 2 of 4, .+ left in all", stage) for stage in stages)
     assert stages[-1] == ""
     assert "4 cases of seed 7: 4 diagnosed, 0 refused, 0 crashed" in render_summary(result)
     # Nothing is left to do another time.

@@ -37,7 +37,7 @@ from ferryid.diagnose.judging.group_loads import LoadDifference, load_difference
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
 from ferryid.effects.effect import Parameter
-from ferryid.effects.wording import listed, weak_evidence
+from ferryid.effects.wording import listed, parameter_word, weak_evidence
 from ferryid.side_by_side import over
 from ferryid.vessel.circumstances import ANYWHERE, Circumstances
 from ferryid.vessel.profile import Profile
@@ -124,16 +124,16 @@ class Difference:
 
     def seen_from(self, name: str) -> str:
         """Return the smallest difference of a parameter that would have been seen, with its unit."""
-        least, label = self.smallest[name], name.replace("_", " ")
+        least, label = self.smallest[name], parameter_word(name)
         if least is None:
             return f"{label} not seen at any size"
         unit = next(each.unit for each in self.candidate.parameters if each.name == name)
-        return f"{label} {100.0 * least:.0f} %" if unit == "-" else f"{label} {least:.2g} {unit}"
+        return f"{label} {100.0 * least:.0f} %" if unit == "-" else f"{label} {float(f'{least:.2g}'):g} {unit}"
 
     def said(self, parameter: Parameter) -> str:
         """Return a parameter with its interval."""
         one = self.estimates[parameter.name]
-        name = parameter.name.replace("_", " ")
+        name = parameter_word(parameter.name)
         if parameter.unit == "-":
             return f"{name} {one.value:.3g} ({one.low:.3g} to {one.high:.3g})"
         return f"{name} {one.value:+.3g} {one.unit} ({one.low:+.3g} to {one.high:+.3g})"

@@ -20,7 +20,7 @@ from ferryid.identify.pipeline import estimator_for
 from ferryid.identify.rows import basis_for
 from ferryid.identify.settings import FOLDS, TEST_WINDOW_S, WINDOWS_S, FitSettings
 from ferryid.identify.split import TooShort
-from ferryid.identify.sweeps.swept import Swept
+from ferryid.identify.sweeps.swept import Swept, beats_base
 from ferryid.identify.sweeps.weak_sweep import sweep_weak
 from ferryid.regression.bases import Basis
 from ferryid.regression.cross_validation import Folds
@@ -70,6 +70,16 @@ class Sweep(Swept):
     def choice(self) -> Selection:
         """What to fit with: the choice by stretches, which every set of logs has."""
         return self.by["blocks"]
+
+    @property
+    def choice_beats_base(self) -> bool:
+        """Whether the choice errs less than the base model, without any correction, does."""
+        return bool(beats_base(self.choice.over_base)[self.choice.window, self.choice.components - 1])
+
+    @property
+    def any_beats_base(self) -> bool:
+        """Whether anything that was tried does."""
+        return bool(beats_base(self.choice.over_base).any())
 
     @property
     def fit_options(self) -> tuple[str, ...]:
@@ -366,6 +376,7 @@ def sweep_json(found: Sweep, report: str | None = None) -> dict[str, Any]:
         "test_window_s": found.test_window_s,
         "by": {key: _choice_json(choice) for key, choice in found.by.items()},
         "choice": {"window_s": found.choice.window_s, "components": found.choice.components},
+        "beats_base": found.choice_beats_base,
         "notes": list(found.notes),
         **found.estimator_json(),
         "fit_options": list(found.fit_options),

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.identify.sweeps.settings_sweep import SCHEMA
-from ferryid.identify.sweeps.swept import Swept
+from ferryid.identify.sweeps.swept import Swept, beats_base
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.regression.bases import Basis
 from ferryid.types import AXES, Flags, Floats, by_axis
@@ -110,6 +110,11 @@ class StructureComparison:
     def supported(self) -> Structure:
         """Of the structures that cannot be told from the best, the one with the fewest coefficients."""
         return min((one for one in self.structures if one.kept), key=lambda one: one.coefficients)
+
+    @property
+    def any_beats_base(self) -> bool:
+        """Whether any structure errs less than the base model does without a correction."""
+        return any(beats_base(over_base(one, self)) for one in self.structures)
 
 
 @dataclass(frozen=True)

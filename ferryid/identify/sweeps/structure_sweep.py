@@ -23,8 +23,8 @@ from ferryid.identify.model_selection import select_model
 from ferryid.identify.rows import basis_for, known_rows, rows_of
 from ferryid.identify.settings import FOLDS, TEST_WINDOW_S, FitSettings
 from ferryid.identify.split import TooShort, correlation_time
-from ferryid.identify.sweeps.settings_sweep import BY, as_a_fit, check_folds, derivative_instead, log_json
-from ferryid.identify.sweeps.structure_comparison import StructureComparison, StructureSweep, over_base
+from ferryid.identify.sweeps.settings_sweep import as_a_fit, check_folds, derivative_instead, log_json
+from ferryid.identify.sweeps.structure_comparison import StructureComparison, StructureSweep
 from ferryid.identify.sweeps.structure_ranking import StructureErrors, rank_structures
 from ferryid.identify.sweeps.weak_structures import compare_weak
 from ferryid.models.forces import compute_residual
@@ -301,10 +301,6 @@ def _notes(by: Mapping[str, StructureComparison], settings: FitSettings) -> list
             "Intervals and p by whole logs hold the scatter within these logs, not that between one day and the next: "
             "a difference may be these days' own."
         )
-    for key, one in by.items():
-        least = min(float(np.nanmean(over_base(structure, one))) for structure in one.structures)
-        if least >= 1.0:
-            notes.append(f"By {BY[key]} none predicts force better than the base model does without any.")
     if blocks.blocks < REGRESSION.few_blocks:
         notes.append(
             f"Only {counted(blocks.blocks, 'independent stretch')} to draw from: the intervals are probably too narrow."

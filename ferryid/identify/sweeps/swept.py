@@ -5,8 +5,24 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from ferryid.identify.outcome import EstimatorScore
 from ferryid.identify.settings import TEST_WINDOW_S, FitSettings
+from ferryid.types import Flags, Floats
+
+
+def beats_base(over_base: Floats) -> Flags:
+    """Return what errs less than the base model, on average over the axes on which that errs at all.
+
+    Parameters
+    ----------
+    over_base
+        Errors over the base model's, shape (..., 3); NaN where that makes none.
+    """
+    known = np.isfinite(over_base)
+    mean = np.where(known, over_base, 0.0).sum(axis=-1) / np.maximum(known.sum(axis=-1), 1)
+    return np.asarray(known.any(axis=-1) & (mean < 1.0))
 
 
 @dataclass(frozen=True, kw_only=True)

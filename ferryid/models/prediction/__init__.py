@@ -8,6 +8,7 @@ from ferryid.models.prediction.free_run import (
     predicted_acceleration,
     run_free,
     runs_free,
+    single_paths,
     single_runs,
     starting_points,
 )
@@ -28,6 +29,7 @@ __all__ = [
     "run_free",
     "runs_free",
     "signal_map",
+    "single_paths",
     "single_runs",
     "starting_points",
     "window_errors",

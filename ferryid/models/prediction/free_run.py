@@ -178,9 +178,21 @@ def single_runs(force: ForceLaw, motion: Motion, starts: Ints, ends: Ints, horiz
     Absolute errors of position [m], heading [rad], speed [m/s] and yaw rate [rad/s]; NaN where a run has diverged, or does
     not reach the horizon within its stretch. Parameters as of `run_free`, and starts and ends as of `starting_points`.
     """
+    return single_paths(force, motion, starts, ends, horizons_s)[0]
+
+
+def single_paths(
+    force: ForceLaw, motion: Motion, starts: Ints, ends: Ints, horizons_s: Sequence[float]
+) -> tuple[Floats, Floats, int]:
+    """Return `single_runs`, where each run went north and east [m], shape (starts, steps, 2), and the rows of a step.
+
+    Positions are NaN once a run has left its stretch or diverged.
+    """
     horizons = np.asarray(horizons_s, dtype=float)
     (path,), stride = _integrate([(motion, starts, ends)], force, float(horizons[-1]))
-    return _errors(path, stride, motion, starts, ends, horizons)
+    inside = starts[:, None] + np.arange(path.shape[1]) * stride < ends[:, None]
+    places = np.where(inside[:, :, None], path[:, :, :2], np.nan)
+    return _errors(path, stride, motion, starts, ends, horizons), places, stride
 
 
 def predicted_acceleration(force: ForceLaw, motion: Motion, *, coupled_sway: bool = True) -> Floats:

@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference import group_differences as inference
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit, estimate_campaign
 from ferryid.diagnose.inference.campaign_logs import Member
@@ -17,9 +18,10 @@ from ferryid.diagnose.inference.campaign_properties import properties_of, with_p
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.group_differences import Comparison, compare_near, differences_of, in_groups
 from ferryid.diagnose.inference.thresholds import INFERENCE
-from ferryid.diagnose.judging.group_differences import JudgedGroups, judge_groups, smallest_note, summary
+from ferryid.diagnose.judging.group_differences import Difference, JudgedGroups, judge_groups, smallest_note, summary
 from ferryid.effects import effects
 from ferryid.types import no_progress
+from ferryid.vessel import load_profile
 from tests.diagnose.inference.test_campaign_properties import weakened
 
 pytestmark = pytest.mark.slow
@@ -152,3 +154,14 @@ def test_of_differences_that_logs_scatter_in_the_likeliest_over_alike_logs_is_se
     _, ((first, contenders),) = inference.select_differences(made, no_progress)
     assert first.key == WEAK
     assert [(one.candidate.key, one.behind) for one in contenders] == [(("payload", None), -74.0)]
+
+
+def test_parameters_and_sizes_are_told_in_words_and_plain_numbers() -> None:
+    profile = load_profile("milliampere")
+    late = Candidate.of(effects()["time_delay"], None, profile)
+    delay = Difference(late, {"seconds": Estimate(0.1, -0.2, 0.4, "s")}, 0.0, 0.1, {"seconds": None})
+    assert delay.said(late.parameters[0]) == "delay +0.1 s (-0.2 to +0.4)"
+    assert delay.seen_from("seconds") == "delay not seen at any size"
+    load = Candidate.of(effects()["payload"], None, profile)
+    laden = Difference(load, {}, 0.0, 0.1, {"mass": 112.0})
+    assert laden.seen_from("mass") == "mass 110 kg"
