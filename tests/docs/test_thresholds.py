@@ -24,6 +24,7 @@ NO_DECISION = {
         signals.time_ranges _DAY_S
         signals.kalman WINDOW_PER_TIME
         draft.write USUAL_THRUST
+        draft.unnamed _UNITS
         effects.payload WATER WATERPLANE
         effects.wind_loads EIGHTH SIXTEENTH THREE_SIXTEENTHS TANGENT_EIGHTH
         diagnose.data.course NORMAL
@@ -78,6 +79,7 @@ NO_DECISION = {
         identify.adaptive.averaging _SUM
         regression.bases.crossflow_integrals LEAST_SPEED_MPS
         regression.cross_products LARGEST
+        draft.unnamed _ROUNDING
         regression.nipals TOLERANCE _EXHAUSTED
         regression.recurrence EXHAUSTED
         regression.resampling.confidence_set ALIKE
@@ -162,6 +164,7 @@ NO_DECISION = {
         signals.render _FIELDS_SHOWN
         draft.samples MOST_ROWS
         draft.autopilots _MOST
+        draft.unnamed _MOST _MOST_READINGS _MOST_ROWS
         draft.control_allocation _MOST
         draft.servo_functions _OUTPUTS
         draft.autopilot_parameters SHOWN_CHANGES

@@ -36,10 +36,15 @@ def _variables() -> dict[str, dict[str, Any]]:
     }
 
 
+_DESCRIBED = b"MATLAB 5.0 MAT-file, written by a test".ljust(116, b"\0")
+"""The text that a MAT file of level 5 begins with."""
+
+
 def _level_5(variables: dict[str, Any], **options: Any) -> bytes:
     file = io.BytesIO()
     scipy.io.savemat(file, variables, **options)
-    return file.getvalue()
+    # Without the second in which it was written, so that a case is the same when it is drawn again.
+    return _DESCRIBED + file.getvalue()[len(_DESCRIBED) :]
 
 
 def _hdf5(variables: dict[str, dict[str, Any]]) -> bytes:
