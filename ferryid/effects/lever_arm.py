@@ -46,8 +46,8 @@ def says(values: Values, instance: str | None) -> str:
     if "x" not in values:
         side = "to starboard" if y >= 0.0 else "to port"
         return (
-            f"Position and velocity belong to a point {abs(y):.2f} m {side} of the body origin; how far ahead of it, "
-            "forces tell beside a hull model only."
+            f"Position and velocity belong to a point {abs(y):.2f} m {side} of the body origin; how far ahead of it "
+            "shows beside a hull model only."
         )
     x = values["x"]
     ends = ("ahead" if x >= 0.0 else "astern", "to starboard" if y >= 0.0 else "to port")
