@@ -69,6 +69,12 @@ def general_warnings(settings: FitSettings, known: Excitation, scores: ModelScor
         warnings.append(f"{which} cannot determine {len(terms)} of the terms: {named}.")
     if scores.seconds < IDENTIFY.validation_s and settings.accept == "thesis":
         warnings.append(f"Only {scores.seconds:.0f} s validate: the verdict rests on little data.")
+    if scores.interval is not None and scores.force.normalised_mse < 1.0 < scores.interval[1]:
+        low, high = scores.interval
+        warnings.append(
+            f"The 95 % interval of the ratio of squared errors, {low:.3g} to {high:.3g}, includes 1: the held-out stretches "
+            "are too few, or too unlike, to be sure that the model predicts better than the base model. Record more of them."
+        )
     if settings.residual == "commanded":
         warnings.append("The correction was fitted to commanded forces; its error is judged against measured ones.")
     for axis, share, ratio in zip(AXES, scores.force.r2_model.tolist(), scores.force.ratio.tolist(), strict=True):

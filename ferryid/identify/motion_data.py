@@ -17,6 +17,7 @@ from ferryid.identify.fit_warnings import fit_warnings
 from ferryid.identify.inertia import axes_without_force
 from ferryid.identify.outcome import Excitation, LogFit
 from ferryid.identify.prediction_windows import PredictionWindows
+from ferryid.identify.ratio_interval import LogErrors, ratio_interval
 from ferryid.identify.rows import basis_for, grids, known_rows, rows_of
 from ferryid.identify.settings import FitSettings, check_components
 from ferryid.identify.shared_rows import SharedRows
@@ -142,12 +143,17 @@ class MotionData(FitData):
         tau = stacked([log.motion.tau for log in logs], masks)
         base, model = stacked([log.tau_base for log in logs], masks), stacked([log.tau_model for log in logs], masks)
         force = force_scores(tau, base, model, np.ones(len(tau), dtype=bool))
+        errors = [
+            LogErrors((log.motion.tau - log.tau_base)[mask], (log.motion.tau - log.tau_model)[mask], log.motion.t[mask])
+            for log, mask in zip(logs, masks, strict=True)
+        ]
         return ModelScores(
             force.without_sway() if self.settings.reduced else force,
             rows=len(tau),
             seconds=sum(float(mask.sum()) / log.motion.rate_hz for log, mask in zip(logs, masks, strict=True)),
             split=self.split.kind,
             split_notes=self.split.notes,
+            interval=ratio_interval([one.without_sway() for one in errors] if self.settings.reduced else errors),
         )
 
     def _training_rows(self) -> list[Rows]:

@@ -15,6 +15,7 @@ import numpy as np
 
 from ferryid.cached import cached_property
 from ferryid.identify.fit_data import Coefficients
+from ferryid.identify.ratio_interval import LogErrors, ratio_interval
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.shared_rows import SharedRows
 from ferryid.identify.split import Split
@@ -160,6 +161,17 @@ class PredictionWindows:
             forces.append((one.force, one.reference(self.base_mass), model))
         return forces
 
+    def interval(self, found: Coefficients) -> tuple[float, float] | None:
+        """Return the 95 % interval of the ratio of squared errors that the verdict is on; None where there is none."""
+        logs = [
+            LogErrors(force - base, force - model, motion.t[one.start])
+            for one, motion, (force, base, model) in zip(self.judged, self.motions, self.predicted(found), strict=True)
+        ]
+        # Windows that overlap are no two, so that a block is twice as long as one.
+        return ratio_interval(
+            [one.without_sway() for one in logs] if self.settings.reduced else logs, 2.0 * self.length_s
+        )
+
     def scores(self, found: Coefficients) -> ModelScores:
         """Return the errors of a model as a model file has them."""
         held_out = self.split.kind != "none"
@@ -172,6 +184,7 @@ class PredictionWindows:
             split=self.split.kind,
             split_notes=self.split.notes,
             measure="prediction",
+            interval=self.interval(found),
         )
 
 

@@ -86,6 +86,8 @@ class ModelScores:
     measure
         ``"force"``: errors of the estimated force, row by row; ``"prediction"``: errors of the predicted acceleration, as a
         force on the base model's mass, in windows of some seconds, which noise does not drown.
+    interval
+        95 % interval of ``force.normalised_mse``; None where there are too few independent blocks, or it was not sought.
     """
 
     force: ForceScores
@@ -94,6 +96,7 @@ class ModelScores:
     split: str
     split_notes: tuple[str, ...]
     measure: str = "force"
+    interval: tuple[float, float] | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Return the scores as a model file has them."""
@@ -104,6 +107,7 @@ class ModelScores:
             "split": self.split,
             "split_notes": list(self.split_notes),
             "measure": self.measure,
+            "interval": None if self.interval is None else list(self.interval),
         }
 
     @classmethod
@@ -134,6 +138,7 @@ class ModelScores:
             split=str(data["split"]),
             split_notes=tuple(str(note) for note in data["split_notes"]),
             measure=str(data.get("measure", "force")),
+            interval=None if (ends := data.get("interval")) is None else (float(ends[0]), float(ends[1])),
         )
 
 

@@ -22,7 +22,10 @@ def headline_of(result: FitOutcome) -> str:
         told = f"its {result.scores.measure} error could not be compared with the base model's"
     else:
         word = "below" if change < 0 else "above"
-        told = f"mean square {result.scores.measure} error {100.0 * abs(change):.1f} % {word} {base} on data it did not see"
+        told = (
+            f"mean square {result.scores.measure} error {100.0 * abs(change):.1f} % {word} {base} on data it did not see"
+            f"{_interval(result)}"
+        )
     count = len(result.warnings)
     trust = (
         f" Read the {counted(count, 'warning')} first." if count > 1 else " Read the warning first." if count else ""
@@ -32,6 +35,14 @@ def headline_of(result: FitOutcome) -> str:
     failed = [check for check in result.acceptance.checks if check.passed is False]
     why = f", but {counted(len(failed), 'condition')} {verb(len(failed), 'fails')}" if failed and change < 0 else ""
     return f"Not accepted: {told}{why}.{_nothing_to_improve(result)}"
+
+
+def _interval(result: FitOutcome) -> str:
+    """Return the ratio of the squared errors with its 95 % interval, in brackets; nothing where there is none."""
+    if result.scores.interval is None:
+        return ""
+    low, high = result.scores.interval
+    return f" (ratio {result.acceptance.normalised_mse:.3g}, 95 % interval {low:.3g} to {high:.3g})"
 
 
 def _nothing_to_improve(result: FitOutcome) -> str:

@@ -31,6 +31,7 @@ from ferryid.diagnose.judging.campaign import judge_campaign
 from ferryid.diagnose.judging.campaign_properties import OutOfStep, PropertyTest, judge_properties
 from ferryid.effects import effects
 from ferryid.effects.actuator_force import force_limits
+from ferryid.effects.effect import HELD
 from ferryid.types import no_progress
 from tests.diagnose.inference.test_campaign_estimation import CALM, FERRY, campaign
 
@@ -137,6 +138,8 @@ def test_what_was_tried_in_a_propertys_place_is_compared_in_its_own_round(monkey
 
     gain: dict[tuple[str, str | None], float] = {}
     monkeypatch.setattr(selection, "_estimated", estimated)
+    # What is begun and not estimated acts by nothing.
+    monkeypatch.setattr(ScoredProperty, "negligible", False)
     monkeypatch.setattr(selection, "properties_of", left)
     _, rivals = select_properties(made, no_progress)
     assert list(rivals) == [("thruster_gain", "thruster1")]
@@ -261,11 +264,19 @@ def test_what_a_start_promises_is_what_the_estimate_keeps() -> None:
     assert start.gain == pytest.approx(kept.evidence - made.evidence, rel=0.3)
 
 
-def test_errors_of_the_navigation_need_a_known_hull() -> None:
+def test_errors_of_the_navigation_that_a_hull_takes_after_need_a_known_one() -> None:
     known = campaign()
     guessed = replace(known, hull=replace(known.hull, known=False))
-    assert {"lever_arm", "heading_bias"} <= {one.effect.id for one in properties_of(known)}
-    assert not {"lever_arm", "heading_bias"} & {one.effect.id for one in properties_of(guessed)}
+
+    def free(whole: Campaign) -> dict[str, set[str]]:
+        return {
+            one.effect.id: {each.name for each in one.parameters if each.size > HELD}
+            for one in properties_of(whole)
+            if one.effect.of_sensor
+        }
+
+    assert free(known) == {"lever_arm": {"x", "y"}, "heading_bias": {"angle"}}
+    assert free(guessed) == {"lever_arm": {"y"}, "heading_bias": {"angle"}}
     assert np.isfinite(start_of(estimate_campaign(known), properties_of(known)[0]).gain)
 
 
