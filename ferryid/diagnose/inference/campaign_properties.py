@@ -150,8 +150,24 @@ def select_properties(made: CampaignFit, progress: Callable[[str], None]) -> tup
             TriedProperty(one.candidate, one.over(best), one.gain / found[0].gain) for one in found if one is not best
         )
         # With what it explains gone, the noise is less; the spreads follow.
-        made = estimate_campaign(best.fit.campaign, begin=best.fit)
+        made = _opened(estimate_campaign(best.fit.campaign, begin=best.fit), best.candidate)
     return made, rivals
+
+
+def _opened(made: CampaignFit, candidate: Candidate) -> CampaignFit:
+    """Return an estimate in which what a selected property holds is free as well, where the evidence favours that.
+
+    What a hull takes after makes no name, but beside a name it would be taken for something else.
+    """
+    profile = made.campaign.members[0].windows.measurements.profile
+    free = replace(candidate, parameters=candidate.effect.parameters_of(profile))
+    if free.parameters == candidate.parameters:
+        return made
+    properties = tuple(free if one == candidate else one for one in made.campaign.properties)
+    begun = replace(made, campaign=replace(made.campaign, properties=properties))
+    opened = estimate_campaign(begun.campaign, noise=made.noise, begin=begun)
+    held = estimate_campaign(made.campaign, noise=made.noise, begin=made)
+    return opened if opened.evidence > held.evidence else made
 
 
 def start_of(made: CampaignFit, candidate: Candidate) -> Start:

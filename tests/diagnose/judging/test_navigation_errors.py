@@ -60,6 +60,15 @@ def test_an_antenna_off_to_one_side_is_found_and_how_far_ahead_is_left_open() ->
     assert "m to port of the body origin; how far ahead" in one.finding(found.hull.fit.campaign.members[0].windows).says
 
 
+def test_an_antenna_off_both_ways_is_no_other_effect_beside_its_side() -> None:
+    """Held at the body origin, how far ahead it is was taken for a weak thruster."""
+    found = judged_as(arm_m=(-1.2, 0.6))
+    assert named(found) == ["lever_arm"]
+    (one,) = (each for each in found.properties if each.confirmed)
+    for name, true in (("x", -1.2), ("y", 0.6)):
+        assert one.estimates[name].low < true < one.estimates[name].high
+
+
 @pytest.mark.parametrize("arm_m", [(0.0, 0.0), (0.6, 0.0)], ids=["none", "an antenna ahead"])
 def test_what_a_hull_takes_after_has_no_name(arm_m: tuple[float, float]) -> None:
     assert named(judged_as(arm_m=arm_m)) == []
