@@ -307,10 +307,11 @@ def _position(pose: _Pose, chosen: _Agreement, named: str) -> MappedSignal:
 def _shown(chosen: _Agreement) -> str:
     if chosen.velocity is None:
         return f"the vessel moves along its heading (mean cosine {chosen.share:.2f})"
-    return (
-        f"its slope{', turned by the heading,' if chosen.frame in _BODY else ''} explains {100 * chosen.share:.0f} % of "
-        f"{chosen.velocity.label}, gain {chosen.gain:.3g}"
-    )
+    turned = ", turned by the heading," if chosen.frame in _BODY else ""
+    label = chosen.velocity.label
+    if chosen.share < DRAFT.agrees:
+        return f"its slope{turned} does not explain {label} ({100 * chosen.share:.0f} %)"
+    return f"its slope{turned} explains {100 * chosen.share:.0f} % of {label}; their size is {chosen.gain:.3g} of the slope's"
 
 
 def _mirror(pose: _Pose, named: str) -> tuple[str, ...]:
@@ -396,7 +397,9 @@ def _velocity(velocity: FieldGroup, chosen: _Agreement, others: Sequence[str]) -
     unit, left = (
         (stated, chosen.gain * KINDS["speed"][stated]) if stated else nearest_unit(chosen.gain, "speed", _SPEED_UNITS)
     )
-    evidence = f"the position's slope explains {100 * chosen.share:.0f} % of it, with {left:.2f} of its size in {unit}"
+    evidence = f"the position's slope explains {100 * chosen.share:.0f} % of it"
+    if chosen.share >= DRAFT.agrees:
+        evidence += f"; in {unit} it is {left:.2f} of the slope's size"
     doubts = []
     if others:
         evidence += f"; of other velocities: {', '.join(others)}"

@@ -203,6 +203,17 @@ def test_a_velocity_that_no_unit_explains_is_to_be_checked(tmp_path: Path) -> No
     columns |= {"u": 1.4 * columns["u"], "v": 1.4 * columns["v"]}
     _, found = drafted(tmp_path, columns)
     assert any(re.search(r"1\.4\d? times the position's slope", one) for one in found["velocity"].doubts)
+    assert any("; in m/s it is 1.4" in one for one in found["velocity"].evidence)
+    assert any("their size is 1.4" in one for one in found["position"].evidence)
+
+
+def test_no_size_is_stated_of_a_velocity_that_does_not_agree(tmp_path: Path) -> None:
+    c = in_ned(sailed())
+    noise = np.random.default_rng(3).normal(size=(2, len(c["t"])))
+    _, found = drafted(tmp_path, c | {"u": noise[0], "v": noise[1]})
+    (position,), (velocity,) = found["position"].evidence, found["velocity"].evidence
+    assert "does not explain" in position
+    assert "size" not in position + velocity
 
 
 def test_the_velocity_that_agrees_is_taken_and_the_others_are_named(tmp_path: Path) -> None:
