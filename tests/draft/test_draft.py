@@ -285,6 +285,18 @@ def test_marked_lines_are_all_that_a_draft_lacks(tmp_path: Path) -> None:
     assert [fault for fault in check_profile(path) if not fault.warning] == []
 
 
+def test_a_check_counts_the_lines_that_are_still_marked(tmp_path: Path) -> None:
+    path = tmp_path / "boat.toml"
+    whole = api.check_vessel("milliampere")
+    assert whole.json["fill_in"] == 0
+    path.write_text(
+        load_profile("gunnerus").text + "# FILL IN: [wind]\n# FILL IN: frontal_m2 = 2.0\n", encoding="utf-8"
+    )
+    found = api.check_vessel(path)
+    assert (found.json["faults"], found.json["fill_in"]) == ([], 2)
+    assert found.text.endswith("no faults\n2 lines marked FILL IN are not used")
+
+
 def test_answers_complete_a_draft(tmp_path: Path) -> None:
     draft = draft_profile(FIXTURES / "short.mcap")
     asked = questions(draft)
