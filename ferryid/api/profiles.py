@@ -38,11 +38,15 @@ def check_vessel(file: str | Path, *, identifiable: bool = False, progress: Prog
 
     faults = check_profile(str(file))
     lines = [f"{file}:{fault.line}: {'warning: ' if fault.warning else ''}{fault.message}" for fault in faults]
-    result = {"schema": "ferryid.vessel-check/1", "file": str(file), "faults": [asdict(fault) for fault in faults]}
-    text = "\n".join(lines) if lines else f"{file}: no faults"
     # What may be missing, such as wind areas, is no fault; it is lacking all the same.
     marked = open_lines(Path(file).read_text(encoding="utf-8")) if Path(file).is_file() else 0
-    result["fill_in"] = marked
+    result = {
+        "schema": "ferryid.vessel-check/1",
+        "file": str(file),
+        "fill_in": marked,
+        "faults": [asdict(fault) for fault in faults],
+    }
+    text = "\n".join(lines) if lines else f"{file}: no faults"
     if marked:
         mark = MARK.removeprefix("# ").rstrip(":")
         text += f"\n{counted(marked, 'line')} marked {mark} {verb(marked, 'is')} not used"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from math import log
 
@@ -79,6 +79,10 @@ def navigation_signals(groups: Sequence[FieldGroup], samples: Samples) -> tuple[
             first, second = (_smoothed(samples, velocity, place) * scale for place in (0, 1))
             motion_u, motion_v = first, second if chosen.frame == "FRD" else -second
     rate = _yaw_rate(groups, samples, slope, pose.heading)
+    if rate is None and (unlike := [one.label for one in groups if one.kind == "yaw_rate"]):
+        place = next(k for k, one in enumerate(found) if one.quantity == "heading")
+        told = f"no yaw rate of the log follows it ({', '.join(unlike)}): none is mapped, and its slope stands for one"
+        found[place] = replace(found[place], doubts=(*found[place].doubts, told))
     if rate is not None:
         found.append(rate)
         # A heading that is interpolated across north has slopes that no vessel has.

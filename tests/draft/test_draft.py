@@ -216,6 +216,16 @@ def test_no_size_is_stated_of_a_velocity_that_does_not_agree(tmp_path: Path) -> 
     assert "size" not in position + velocity
 
 
+def test_a_yaw_rate_that_does_not_follow_the_heading_is_named(tmp_path: Path) -> None:
+    c = in_ned(sailed())
+    noise = np.random.default_rng(4).normal(size=len(c["t"]))
+    _, found = drafted(tmp_path, c | {"r": noise})
+    assert "yaw_rate" not in found
+    assert found["heading"].doubts == (
+        "no yaw rate of the log follows it (table: r): none is mapped, and its slope stands for one",
+    )
+
+
 def test_the_velocity_that_agrees_is_taken_and_the_others_are_named(tmp_path: Path) -> None:
     c = sailed()
     noise = np.random.default_rng(1).normal(size=(4, len(c["t"])))
