@@ -30,14 +30,26 @@ def check_vessel(file: str | Path, *, identifiable: bool = False, progress: Prog
     """Return every fault of a vessel profile with its line; ``json["faults"]`` is empty where there is none.
 
     With `identifiable`, a profile without faults is simulated, and ``json["identifiability"]`` has which effects its sensors
-    can distinguish, and what each further sensor adds.
+    can distinguish, and what each further sensor adds. ``json["fill_in"]`` is how many lines of a draft are still marked.
     """
+    from ferryid.counts import counted, verb
+    from ferryid.draft.write import MARK, open_lines
     from ferryid.vessel import check_profile
 
     faults = check_profile(str(file))
     lines = [f"{file}:{fault.line}: {'warning: ' if fault.warning else ''}{fault.message}" for fault in faults]
-    result = {"schema": "ferryid.vessel-check/1", "file": str(file), "faults": [asdict(fault) for fault in faults]}
+    # What may be missing, such as wind areas, is no fault; it is lacking all the same.
+    marked = open_lines(Path(file).read_text(encoding="utf-8")) if Path(file).is_file() else 0
+    result = {
+        "schema": "ferryid.vessel-check/1",
+        "file": str(file),
+        "fill_in": marked,
+        "faults": [asdict(fault) for fault in faults],
+    }
     text = "\n".join(lines) if lines else f"{file}: no faults"
+    if marked:
+        mark = MARK.removeprefix("# ").rstrip(":")
+        text += f"\n{counted(marked, 'line')} marked {mark} {verb(marked, 'is')} not used"
     if not identifiable or any(not fault.warning for fault in faults):
         return outcome_of(result, text)
     from ferryid.identifiability import as_json, as_text, study

@@ -108,7 +108,8 @@ def _statement(
     evidence = not ((clear or hint) and first in judged.trained)
     error = {"force": "MSE", "prediction": "prediction MSE"}.get(kind, f"{what} error")
     place = place_of(kind, what, horizon)
-    span = f" [{low:.3g}, {high:.3g}]" if known else ""
+    # In words: "of the other's [0.1, 0.2]" reads as if the brackets belonged to the other model.
+    span = f" (95 % interval {low:.3g} to {high:.3g})" if known else ""
     if not isfinite(ratio):
         says = f"{first} and {second} cannot be compared {place}: one of them makes no error, or there is nothing to judge by"
     elif alike:

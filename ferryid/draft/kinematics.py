@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from math import log
 
@@ -79,6 +79,10 @@ def navigation_signals(groups: Sequence[FieldGroup], samples: Samples) -> tuple[
             first, second = (_smoothed(samples, velocity, place) * scale for place in (0, 1))
             motion_u, motion_v = first, second if chosen.frame == "FRD" else -second
     rate = _yaw_rate(groups, samples, slope, pose.heading)
+    if rate is None and (unlike := [one.label for one in groups if one.kind == "yaw_rate"]):
+        place = next(k for k, one in enumerate(found) if one.quantity == "heading")
+        told = f"no yaw rate of the log follows it ({', '.join(unlike)}): none is mapped, and its slope stands for one"
+        found[place] = replace(found[place], doubts=(*found[place].doubts, told))
     if rate is not None:
         found.append(rate)
         # A heading that is interpolated across north has slopes that no vessel has.
@@ -307,10 +311,11 @@ def _position(pose: _Pose, chosen: _Agreement, named: str) -> MappedSignal:
 def _shown(chosen: _Agreement) -> str:
     if chosen.velocity is None:
         return f"the vessel moves along its heading (mean cosine {chosen.share:.2f})"
-    return (
-        f"its slope{', turned by the heading,' if chosen.frame in _BODY else ''} explains {100 * chosen.share:.0f} % of "
-        f"{chosen.velocity.label}, gain {chosen.gain:.3g}"
-    )
+    turned = ", turned by the heading," if chosen.frame in _BODY else ""
+    label = chosen.velocity.label
+    if chosen.share < DRAFT.agrees:
+        return f"its slope{turned} does not explain {label} ({100 * chosen.share:.0f} %)"
+    return f"its slope{turned} explains {100 * chosen.share:.0f} % of {label}; their size is {chosen.gain:.3g} of the slope's"
 
 
 def _mirror(pose: _Pose, named: str) -> tuple[str, ...]:
@@ -396,7 +401,9 @@ def _velocity(velocity: FieldGroup, chosen: _Agreement, others: Sequence[str]) -
     unit, left = (
         (stated, chosen.gain * KINDS["speed"][stated]) if stated else nearest_unit(chosen.gain, "speed", _SPEED_UNITS)
     )
-    evidence = f"the position's slope explains {100 * chosen.share:.0f} % of it, with {left:.2f} of its size in {unit}"
+    evidence = f"the position's slope explains {100 * chosen.share:.0f} % of it"
+    if chosen.share >= DRAFT.agrees:
+        evidence += f"; in {unit} it is {left:.2f} of the slope's size"
     doubts = []
     if others:
         evidence += f"; of other velocities: {', '.join(others)}"

@@ -210,13 +210,17 @@ def left_to_the_page(diagnoses: Sequence[Diagnosis], told: Sequence[str]) -> str
 
 
 def names_of(diagnosis: Diagnosis, common: Sequence[Finding] = ()) -> str:
-    """Return the effects of a log in words, hints apart, without those of all logs where it has others."""
+    """Return the effects of a log in words, hints apart, those of all logs without their names."""
     own = diagnosis_words.findings_of(diagnosis, common)
+    shared = len(own) < len(diagnosis.findings)
     sure = list(dict.fromkeys(_inline(one) for one in own if one.sure))
     hints = [name for name in dict.fromkeys(_inline(one) for one in own if not one.sure) if name not in sure]
     parts = [", ".join(sure)] if sure else []
     parts += [f"perhaps {', '.join(hints)}"] if hints else []
-    return "; ".join(parts) or ("only what all logs have" if diagnosis.findings else "–")
+    if not parts:
+        return "only what all logs have" if shared else "–"
+    # Without these words the row would contradict the table of effects, which counts this log.
+    return "; ".join(parts) + (", beside what all logs have" if shared else "")
 
 
 def _inline(finding: Finding) -> str:

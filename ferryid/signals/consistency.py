@@ -112,10 +112,13 @@ def _compare(rate: str, of: str, seen: _Changes, least: float, known: tuple[tupl
     gain = both / float(integral @ integral)
     correlation = both / float(np.sqrt((change @ change) * (integral @ integral)))
     if abs(correlation) < SIGNALS.related_correlation:
-        numbers = f"gain {gain:.3g}, correlation {correlation:.2f}"
+        numbers = f"whose slope is {gain:.3g} times it, correlation {correlation:.2f}"
         return [Doubt(f"The {rate} does not follow the {of} ({numbers}): check topic, frame and clocks.", False)]
     low, high = _range(seen)
-    numbers = f"gain {gain:.3g} [{low:.3g}, {high:.3g}], correlation {correlation:.2f}"
+    # Which of the two is the larger has to be said: "gain" alone is read either way, and 1.2 is near 0.83.
+    numbers = (
+        f"whose slope is {gain:.3g} times it, 99 % interval {low:.3g} to {high:.3g}, correlation {correlation:.2f}"
+    )
     size = next((text for value, text in known if abs(abs(gain) / value - 1.0) < SIGNALS.unit_gain), "")
     certain = abs(correlation) > SIGNALS.certain_correlation
     if gain < 0:

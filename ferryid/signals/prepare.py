@@ -12,6 +12,7 @@ import numpy as np
 from ferryid.cached import cached_property
 from ferryid.errors import FerryIdError
 from ferryid.signals.align import align
+from ferryid.signals.artificial import artificial
 from ferryid.signals.data_quality import left_out_sentences
 from ferryid.signals.faults import Faults
 from ferryid.signals.quality import POSE
@@ -35,7 +36,7 @@ class Opened:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """Contradictions between its signals, and actuators known by their orders alone, as sentences."""
+        """That no sensor measured it, contradictions between signals, and actuators known by orders alone, as sentences."""
         return doubts_of(self.recording, self.track)
 
     @property
@@ -64,10 +65,15 @@ class Prepared:
         return left_out_sentences(self.recording, self.motion.left_out, self.motion.valid)
 
 
-def doubts_of(recording: Recording, track: Track) -> tuple[str, ...]:
-    """Return what to mind of a log as sentences: signals that contradict each other, end early or are not there."""
+def doubts_of(recording: Recording, track: Track, *, origin: bool = True) -> tuple[str, ...]:
+    """Return what to mind of a log as sentences: signals that contradict each other, end early or are not there.
+
+    With `origin` also that it is no recording of a vessel.
+    """
+    why = artificial(recording) if origin else ""
     empty = [name for name in POSE if name in track.columns and not np.isfinite(track.columns[name]).any()]
     return (
+        *((f"It is no recording of a vessel: {why}.",) if why else ()),
         *(doubt.says for doubt in track.doubts),
         *(repair for repair in track.repairs if repair == SWAY_NOT_MEASURED),
         *recording.orders_for_feedback,

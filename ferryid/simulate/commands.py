@@ -63,7 +63,7 @@ def run_scenario(
     sailing = None
     if model is not None:
         sailing = sailed_by(asked, model, conditions)
-        asked = sailing.scenario
+        asked, conditions = sailing.scenario, sailing.conditions
     elif conditions:
         raise FerryIdError(
             f"--conditions: {conditions} are conditions of a log that a model was diagnosed on, found no --model. "

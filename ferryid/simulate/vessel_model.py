@@ -34,13 +34,15 @@ VESSEL_KEYS = (
 class Sailing:
     """A scenario as a model sails it: what was changed in it, the vessel, and what of the scenario was set aside.
 
-    `terms` is what the model has beside the hull of the vessel; None where it has nothing.
+    `terms` is what the model has beside the hull of the vessel; None where it has nothing. `conditions` is the name, in the
+    model, of the log whose conditions prevail, however it was given; empty without one.
     """
 
     scenario: Scenario
     vessel: Profile
     notes: tuple[str, ...]
     terms: UnmappedTerms | None = None
+    conditions: str = ""
 
 
 def sailed_by(scenario: Scenario, model: Model, conditions: str = "") -> Sailing:
@@ -56,7 +58,7 @@ def sailed_by(scenario: Scenario, model: Model, conditions: str = "") -> Sailing
     model
         The vessel.
     conditions
-        Name of a log that the model was diagnosed on, whose conditions are to prevail; none where empty.
+        Name, file or path of a log that the model was diagnosed on, whose conditions are to prevail; none where empty.
 
     Raises
     ------
@@ -97,6 +99,7 @@ def sailed_by(scenario: Scenario, model: Model, conditions: str = "") -> Sailing
         replace(own, hull=replace_hull_coefficients(own.hull, hull_coefficients(model))),
         tuple(f"the scenario's [{'.'.join(place)}] is set aside: the vessel is {model.label}" for place in aside),
         terms,
+        "" if chosen is None else chosen.log,
     )
 
 

@@ -76,7 +76,7 @@ def test_from_a_diagnosis_to_a_simulation(ferryid, tmp_path: Path) -> None:
     assert pair["mse"]["yaw"]["low"] > 1.0
 
     sailed = ferryid(
-        "simulate", scenario, "--model", "ferry@1", "--models", out, "--conditions", "trial", "--log", tmp_path / "a.bag",
+        "simulate", scenario, "--model", "ferry@1", "--models", out, "--conditions", log, "--log", tmp_path / "a.bag",
         "--json", "-",
     )  # fmt: skip
     assert sailed.code == 0, sailed.err

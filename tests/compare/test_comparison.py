@@ -116,7 +116,7 @@ def test_the_true_model_is_found_better(compared: Comparison) -> None:
     assert row.p <= row.p_corrected <= 0.05
     assert row.high < 1.0
     assert row.sentence.startswith(f"{BASE} is better than ferry@2 on sway (p 0.")
-    assert "of the other's [" in row.sentence
+    assert "of the other's (95 % interval " in row.sentence
     assert told["sway", "ferry@1", "ferry@2"].better == "ferry@1"
     # Nine comparisons of accelerations and six of free runs: each p is raised, and none beyond their number.
     assert len(told) == 15

@@ -203,6 +203,27 @@ def test_a_velocity_that_no_unit_explains_is_to_be_checked(tmp_path: Path) -> No
     columns |= {"u": 1.4 * columns["u"], "v": 1.4 * columns["v"]}
     _, found = drafted(tmp_path, columns)
     assert any(re.search(r"1\.4\d? times the position's slope", one) for one in found["velocity"].doubts)
+    assert any("; in m/s it is 1.4" in one for one in found["velocity"].evidence)
+    assert any("their size is 1.4" in one for one in found["position"].evidence)
+
+
+def test_no_size_is_stated_of_a_velocity_that_does_not_agree(tmp_path: Path) -> None:
+    c = in_ned(sailed())
+    noise = np.random.default_rng(3).normal(size=(2, len(c["t"])))
+    _, found = drafted(tmp_path, c | {"u": noise[0], "v": noise[1]})
+    (position,), (velocity,) = found["position"].evidence, found["velocity"].evidence
+    assert "does not explain" in position
+    assert "size" not in position + velocity
+
+
+def test_a_yaw_rate_that_does_not_follow_the_heading_is_named(tmp_path: Path) -> None:
+    c = in_ned(sailed())
+    noise = np.random.default_rng(4).normal(size=len(c["t"]))
+    _, found = drafted(tmp_path, c | {"r": noise})
+    assert "yaw_rate" not in found
+    assert found["heading"].doubts == (
+        "no yaw rate of the log follows it (table: r): none is mapped, and its slope stands for one",
+    )
 
 
 def test_the_velocity_that_agrees_is_taken_and_the_others_are_named(tmp_path: Path) -> None:
@@ -272,6 +293,18 @@ def test_marked_lines_are_all_that_a_draft_lacks(tmp_path: Path) -> None:
     assert all("lacks" in one for one in faults)
     path.write_text(text.replace("# FILL IN: ", ""), encoding="utf-8")
     assert [fault for fault in check_profile(path) if not fault.warning] == []
+
+
+def test_a_check_counts_the_lines_that_are_still_marked(tmp_path: Path) -> None:
+    path = tmp_path / "boat.toml"
+    whole = api.check_vessel("milliampere")
+    assert whole.json["fill_in"] == 0
+    path.write_text(
+        load_profile("gunnerus").text + "# FILL IN: [wind]\n# FILL IN: frontal_m2 = 2.0\n", encoding="utf-8"
+    )
+    found = api.check_vessel(path)
+    assert (found.json["faults"], found.json["fill_in"]) == ([], 2)
+    assert found.text.endswith("no faults\n2 lines marked FILL IN are not used")
 
 
 def test_answers_complete_a_draft(tmp_path: Path) -> None:

@@ -141,7 +141,12 @@ def test_a_log_with_two_of_a_kind_counts_once() -> None:
 def test_what_all_logs_have_is_no_name_of_each() -> None:
     every = [log(name, gain(), *one) for name, one in (("a", [flow(1.0, 0.0)]), ("b", []))]
     common = (every[0].findings[0],)
-    assert [campaign.names_of(one, common) for one in every] == ["steady wind", "only what all logs have"]
+    assert [campaign.names_of(one, common) for one in every] == [
+        "steady wind, beside what all logs have",
+        "only what all logs have",
+    ]
+    own = replace(every[0], findings=every[0].findings[1:])
+    assert campaign.names_of(own, common) == "steady wind"
     assert campaign.names_of(replace(every[1], findings=()), common) == "–"
     assert campaign.names_of(every[1]) == "thruster force (thruster1)"
 

@@ -65,9 +65,9 @@ def result(
 
 def test_what_is_better_is_said_with_its_ratio_and_chance() -> None:
     said = comparison_words.sentences(result(("one", "two"), 0.001), "log")
-    assert (
-        said[0]
-        == "one is better than two on surge (p 0.005): its prediction MSE is 0.769 of the other's [0.692, 0.846]"
+    assert said[0] == (
+        "one is better than two on surge (p 0.005): its prediction MSE is 0.769 of the other's "
+        "(95 % interval 0.692 to 0.846)"
     )
     # Errors of free runs are not squared.
     assert "one is better than two in heading, run free for 30 s (p 0.005): its heading error is 0.877 of" in said[4]

@@ -61,11 +61,12 @@ def test_short_logs_and_logs_at_rest_can_show_no_contradiction() -> None:
         (
             "u",
             1 / 0.514444,
-            "surge velocity does not match the position (gain 0.514 [0.514, 0.514], correlation 1.00): knots look",
+            "surge velocity does not match the position (whose slope is 0.514 times it, 99 % interval 0.514 to 0.514, "
+            "correlation 1.00): knots look",
         ),
         ("u", 0.514444, "m/s look read as knots"),
-        ("v", -1.0, "sway velocity has the wrong sign against the position (gain -1"),
-        ("u", 1.3, "surge velocity does not match the position (gain 0.769"),
+        ("v", -1.0, "sway velocity has the wrong sign against the position (whose slope is -1 times it"),
+        ("u", 1.3, "surge velocity does not match the position (whose slope is 0.769 times it"),
     ],
 )
 def test_wrong_signs_and_units_are_named(name: str, factor: float, said: str) -> None:
@@ -119,7 +120,7 @@ def test_one_jump_of_the_position_does_not_outweigh_the_rest() -> None:
 @pytest.mark.parametrize("gain", [0.9, 1.1])
 def test_a_tenth_is_found_in_clean_signals(name: str, gain: float) -> None:
     (finding,) = cross_checks(voyage(**{name: voyage().columns[name] / gain}))
-    assert f"(gain {gain:.3g} [" in finding.says
+    assert f"(whose slope is {gain:.3g} times it, 99 % interval " in finding.says
     assert "check the scale of the" in finding.says
     assert ("lever arm" in finding.says) is (name != "r")
     assert not finding.certain
@@ -144,7 +145,7 @@ def test_the_undamaged_trial_raises_no_doubt_and_a_tenth_does(tmp_path: Path) ->
     assert open_track(str(written(ten_minutes(), tmp_path / "clean.mcap")), ferry, None).doubts == ()
     made = changed(ten_minutes(), [(-1.0, 1e4)], scaled(SURGE, 1.0 / 0.9))
     (doubt,) = open_track(str(written(made, tmp_path / "tenth.mcap")), ferry, None).doubts
-    assert doubt.startswith("The surge velocity does not match the position (gain 0.8")
+    assert doubt.startswith("The surge velocity does not match the position (whose slope is 0.8")
     assert doubt.endswith(
         "check the scale of the surge velocity in the profile, and the lever arm of what is measured away "
         "from the body origin."

@@ -83,7 +83,8 @@ def test_the_conditions_of_a_log_prevail_when_asked_for() -> None:
     aboard = stored("payload", mass=200.0, x=0.5, onset_s=20.0)
     model = hull_alone(vessel_effects=(late,), conditions=(Conditions("trial", HERE, (WINDY, aboard)),))
     held = sailed_by(parse_scenario(TRIAL, "t"), model, "trial").scenario
-    assert sailed_by(parse_scenario(TRIAL, "t"), model, "logs/trial.mcap").scenario == held
+    by_path = sailed_by(parse_scenario(TRIAL, "t"), model, "logs/trial.mcap")
+    assert (by_path.scenario, by_path.conditions) == (held, "trial")
     assert (held.wind.north_mps, held.wind.east_mps) == (-4.0, 3.0)
     assert (held.payload[0].mass_kg, held.payload[0].from_s) == (200.0, 20.0)
     assert held.thrusters.faults[0].from_s == 30.0

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ferryid.diagnose.data.simulated import artificial
 from ferryid.diagnose.data.thresholds import DATA
 from ferryid.effects.force_model import Measurements
 from ferryid.effects.measurements import actuator_forces, interpolate_gaps, rudder_states
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.models import validity_ranges
 from ferryid.signals.align import align
+from ferryid.signals.artificial import artificial
 from ferryid.signals.complementary_filter import CUBIC_S, complementary_filter
 from ferryid.signals.consistency import comparable
 from ferryid.signals.data_quality import left_out_sentences, repair_sentences
@@ -201,7 +201,8 @@ def read_measurements(
     motion = smooth_measured(measured, min(MEAN_S, window_s))
     repeats = _repeats(faults.repeats, track.t0_ns)
     measurements = replace(_measurements(track, measured, profile, window_s), repeats=repeats)
-    doubts = doubts_of(recording, track)
+    # Where a log comes from is asked of all logs together.
+    doubts = doubts_of(recording, track, origin=False)
     # Windows of a diagnosis end at a gap, so that smoothing loses nothing beside it; but they need the pose.
     placeless = LeftOut.of(
         "the position or heading was not measured", measured.usable & ~measurements.usable, track.rate_hz

@@ -9,10 +9,11 @@ from typing import cast
 import numpy as np
 import pytest
 
-from ferryid.diagnose.data.simulated import along_share, artificial, relative_noise, simulated, summed_share
+from ferryid.diagnose.data.simulated import relative_noise, simulated
 from ferryid.effects.force_model import Measurements
 from ferryid.ingest.clocks import ClockReport
 from ferryid.ingest.log import Topic
+from ferryid.signals.artificial import along_share, artificial, summed_share
 from ferryid.signals.stream import Recording, Stream
 from ferryid.vessel import load_profile
 
