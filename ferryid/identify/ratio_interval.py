@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import stdtrit
 
+from ferryid.regression import REGRESSION
 from ferryid.regression.resampling import paired_block_seconds, sum_over_blocks
-from ferryid.regression.thresholds import REGRESSION
 from ferryid.types import Floats
 
 
