@@ -38,9 +38,11 @@ else:
         def __get__(self, instance: object | None, owner: type) -> Self | T:
             if instance is None:
                 return self
-            # An attribute of the instance comes before this, which defines no `__set__`: it is called once.
-            value = instance.__dict__[self.name] = self.method(instance)
-            return value
+            # An attribute of the instance comes before this, which defines no `__set__`: only `super()` asks again.
+            if self.name not in instance.__dict__:
+                instance.__dict__[self.name] = self.method(instance)
+            found: T = instance.__dict__[self.name]
+            return found
 
 
 __all__ = ["cached_property"]

@@ -53,3 +53,18 @@ def test_a_property_is_worked_out_once() -> None:
 
 def test_it_is_documented_as_its_method_is() -> None:
     assert Sum.first.__doc__ == "Needs the second of another one."
+
+
+def test_a_property_that_another_class_overrides_stays_as_it_was_worked_out() -> None:
+    class Child(Sum):
+        @cached_property
+        def first(self) -> int:
+            return super().first + 10
+
+        def again(self) -> int:
+            return super().first
+
+    one = Child(None)
+    assert one.first == 11
+    one.again()
+    assert one.first == 11

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import stdtrit
 
+from ferryid.regression import REGRESSION
 from ferryid.regression.resampling import paired_block_seconds, sum_over_blocks
-from ferryid.regression.thresholds import REGRESSION
 from ferryid.types import Floats
 
 
@@ -35,9 +35,9 @@ class LogErrors:
 def ratio_interval(logs: Sequence[LogErrors], least_block_s: float = 0.0) -> tuple[float, float] | None:
     """Return the 95 % interval of the mean square of the new model's errors over the base model's, averaged over the axes.
 
-    Sums over blocks of time are independent where blocks outlast the memory of the errors. The logarithm of the ratio of two
-    such sums, linearised, has Student's distribution (Cochran 1977, chapter 6, ratio estimators). Squares are in units of the
-    base model's mean square of each axis, so that their ratio is the mean of those of the axes.
+    Sums over blocks of time are independent where blocks outlast the memory of the errors. The logarithm of a mean of ratios of
+    such sums, linearised, has Student's distribution (Cochran 1977, chapter 6, ratio estimators). The base model's mean square
+    of an axis, which its ratio is over, is as uncertain as the new model's.
 
     Parameters
     ----------
@@ -66,21 +66,22 @@ def ratio_interval(logs: Sequence[LogErrors], least_block_s: float = 0.0) -> tup
     sums = []
     for one, squares in zip(some, pairs, strict=True):
         block_s, _ = paired_block_seconds(squares.reshape(len(squares), -1), one.rate_hz)
-        sums.append(sum_over_blocks(squares.sum(axis=2, keepdims=True), one.at_s, max(block_s, least_block_s)))
-    return _interval(np.concatenate(sums)[:, :, 0])
+        sums.append(sum_over_blocks(squares, one.at_s, max(block_s, least_block_s)))
+    return _interval(np.concatenate(sums))
 
 
 def _interval(sums: Floats) -> tuple[float, float] | None:
-    """Return the interval of a ratio of sums over blocks, shape (blocks, 2), the first column's over the second's."""
+    """Return the interval of a mean of ratios of sums over blocks, shape (blocks, 2, axes), the first over the second."""
     blocks = len(sums)
     if blocks < REGRESSION.paired_fewest_blocks:
         return None
-    total = sums.sum(axis=0)
-    if not (total > 0.0).all():
+    model, base = sums.sum(axis=0)
+    if not model.any():
         return None
-    # A block's share in the one sum less its share in the other: its part in the logarithm of their ratio.
-    shares = sums / total
-    error = np.sqrt(blocks / (blocks - 1.0) * np.sum((shares[:, 0] - shares[:, 1]) ** 2))
+    ratios = model / base
+    ratio = float(ratios.mean())
+    # A block's part in the logarithm of the mean; that of all blocks is none.
+    parts = ((sums[:, 0] - ratios * sums[:, 1]) / base).mean(axis=1) / ratio
+    error = np.sqrt(blocks / (blocks - 1.0) * np.sum(parts**2))
     reach = float(stdtrit(blocks - 1, 0.975) * error)
-    ratio = float(total[0] / total[1])
     return ratio * np.exp(-reach), ratio * np.exp(reach)

@@ -48,6 +48,17 @@ def test_axes_count_alike_whatever_their_units() -> None:
     assert ratio_interval([scaled]) == pytest.approx(found)
 
 
+def test_the_base_models_error_of_each_axis_is_as_uncertain_as_the_new_models() -> None:
+    one, ratios = errors(400.0, 6, memory_s=2.0), np.array([0.05, 0.05, 1.0])
+    # Where the one errs more the other does, and the ratio of every axis is known.
+    alike = LogErrors(one.base, np.sqrt(ratios) * one.base, one.at_s)
+    assert ratio_interval([alike]) == pytest.approx((ratios.mean(), ratios.mean()), rel=1e-9)
+    apart = LogErrors(one.base, np.sqrt(ratios) * (0.95 * one.base + 0.05 * one.model), one.at_s)
+    found = ratio_interval([apart])
+    assert found is not None
+    assert found[0] == pytest.approx(found[1], rel=0.1)
+
+
 def test_an_axis_without_errors_of_the_base_model_has_no_part() -> None:
     one = errors(300.0, 3)
     found = ratio_interval([one.without_sway()])

@@ -10,7 +10,7 @@ from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.campaign import CommonHull
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit, bare_campaign, estimate_campaign
 from ferryid.diagnose.inference.campaign_model import Campaign
-from ferryid.diagnose.inference.campaign_properties import properties_of
+from ferryid.diagnose.inference.campaign_properties import properties_of, with_property
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.group_differences import grouped_as
 from ferryid.diagnose.inference.thresholds import INFERENCE
@@ -142,7 +142,7 @@ def judge_campaign(campaign: Campaign, place: Mapping[str, int], progress: Calla
     if load is not None and load.confirmed:
         aboard = _begun(load.change.candidate, load.difference.estimates)
         parted = grouped_as(campaign, load.fit.campaign)
-        beside = _beside(parted, alone, found[1], judged, (aboard,))
+        beside = _beside(parted, alone, _beside_load(load.fit, found[1]), judged, (aboard,))
         again = load.beside(beside[0].hull.fit, aboard)
         # A load that conditions beside it explain is none.
         load, found = (again, beside) if again.confirmed else (None, found)
@@ -178,6 +178,19 @@ def _beside(
             break
         confirmed, conditions = held, alone
     return conditions, properties
+
+
+def _beside_load(made: CampaignFit, properties: tuple[PropertyTest, ...]) -> tuple[PropertyTest, ...]:
+    """Return properties with those that are not confirmed tested again beside a load, which they may have stood in for."""
+    found = []
+    for one in properties:
+        if not one.confirmed:
+            begun = with_property(made, _begun(one.candidate, one.estimates))
+            fit = estimate_campaign(begun.campaign, noise=made.noise, begin=begun)
+            one = replace(tested(fit, fit.campaign.properties[-1], ()), rivals=one.rivals, alike=one.alike)
+        if one.evidence >= INFERENCE.prior_odds:
+            found.append(one)
+    return tuple(found)
 
 
 def _begun(candidate: Candidate, estimates: Mapping[str, Estimate]) -> Candidate:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
-from math import hypot, nan, sqrt
+from math import hypot, isfinite, nan, sqrt
 from pathlib import Path
 from typing import Any
 
@@ -229,16 +229,20 @@ def _contradictions(found: Sequence[StoredEffect], profile: Profile) -> list[str
 def _together(found: Sequence[StoredEffect]) -> StoredEffect:
     """Return one effect from several logs, each weighed by its inverse variance.
 
-    Where the logs differ by more than their intervals say, the interval of the mean is widened by as much; Birge (1932).
+    Where the logs differ by more than their intervals say, the interval of the mean is widened by as much; Birge (1932). What
+    has no interval in some log has none then, and logs count alike for it.
     """
     sources = tuple(source for stored in found for source in stored.sources)
-    if all(one.parameters == found[0].parameters for one in found):
+    if all(_plain(one) == _plain(found[0]) for one in found):
         # One log, or one estimate from all of them.
         return replace(found[0], sources=sources)
     parameters = {}
     for name, one in found[0].parameters.items():
         several = [stored.parameters[name] for stored in found]
         values = np.array([each.value for each in several])
+        if not all(isfinite(each.high - each.low) for each in several):
+            parameters[name] = Quantity(float(values.mean()), nan, nan, one.unit)
+            continue
         variance = np.maximum(np.array([(each.high - each.low) / 3.92 for each in several]), 1e-12) ** 2
         weight = 1.0 / variance
         mean = float(np.sum(weight * values) / np.sum(weight))
@@ -246,6 +250,14 @@ def _together(found: Sequence[StoredEffect]) -> StoredEffect:
         end = 1.96 * sqrt(max(1.0, excess) / float(np.sum(weight)))
         parameters[name] = Quantity(mean, mean - end, mean + end, one.unit)
     return replace(found[0], parameters=parameters, sources=sources)
+
+
+def _plain(stored: StoredEffect) -> dict[str, tuple[float | None, ...]]:
+    """Return parameters with their ends; None for an end that is not known, which is as another that is not."""
+    return {
+        name: (one.value, *(end if isfinite(end) else None for end in (one.low, one.high)))
+        for name, one in stored.parameters.items()
+    }
 
 
 def _composed(

@@ -46,14 +46,14 @@ def member_of(measurements: Measurements) -> Member:
     return Member(seen, ForceModel(thin, wrong, thin.parts, thin.angles, still))
 
 
-def campaign(loaded: Sequence[bool], order: Sequence[int] | None = None) -> Campaign:
-    return together([sail(number, one) for number, one in enumerate(loaded)], order)
+def campaign(loaded: Sequence[bool], order: Sequence[int] | None = None, known: bool = False) -> Campaign:
+    return together([sail(number, one) for number, one in enumerate(loaded)], order, known)
 
 
-def together(members: Sequence[Member], order: Sequence[int] | None = None) -> Campaign:
-    """Return a campaign of logs of a vessel without a hull model."""
+def together(members: Sequence[Member], order: Sequence[int] | None = None, known: bool = False) -> Campaign:
+    """Return a campaign of logs of a vessel, without a hull model unless it is known."""
     none = np.zeros(len(INDUCED))
-    hull = HullPrior(np.append(members[0].plain.hull, none), np.append(SPREAD, none), known=False)
+    hull = HullPrior(np.append(members[0].plain.hull, none), np.append(SPREAD, none), known=known)
     return Campaign(tuple(members), hull, order=tuple(range(len(members)) if order is None else order))
 
 
@@ -105,3 +105,11 @@ def test_a_load_that_was_measured_is_not_sought() -> None:
     plain = replace(first.plain, measurements=measured.measurements)
     told = replace(whole, members=(replace(first, windows=measured, plain=plain), *whole.members[1:]))
     assert judged(told).load is None
+
+
+def test_no_load_of_all_logs_is_hinted_at_beside_one_of_some_that_it_stood_in_for() -> None:
+    found = judged(campaign([False, False, False, True, True, True], known=True))
+    assert found.load is not None
+    assert found.load.confirmed
+    named = [[one.finding.effect for one in found.claims(f"trials/{i}.bag")].count("payload") for i in range(6)]
+    assert named == [0, 0, 0, 1, 1, 1]

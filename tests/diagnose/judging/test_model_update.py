@@ -25,6 +25,7 @@ from ferryid.diagnose.judging.posterior import Posterior, posterior_of
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
 from ferryid.effects import effects
 from ferryid.effects.force_model import acceleration
+from ferryid.models import Quantity, Source, StoredEffect
 from ferryid.models.model import Model
 from ferryid.models.store.versions import load_file
 from ferryid.report.comparison_words import render_effects
@@ -310,6 +311,28 @@ def test_one_estimate_from_all_logs_counts_once(folder: Path, fouled: str) -> No
     made, _ = update_model(told(replace(one, hull=None), replace(two, hull=None)), FERRY, None, "ferry")
     assert made is not None
     assert made.hull == {}
+
+
+@pytest.mark.parametrize("apart", [0.0, 0.01], ids=["one estimate", "two"])
+def test_what_has_no_interval_keeps_its_value_and_leaves_the_rest_as_it_is(apart: float) -> None:
+    parts = []
+    for k in (0.0, 1.0):
+        side = 0.7 + apart * k
+        # Each log has its own NaN.
+        arm = {
+            "x": Quantity(apart * k, float("nan"), float("nan"), "m"),
+            "y": Quantity(side, side - 0.1, side + 0.1, "m"),
+        }
+        stored = StoredEffect("lever_arm", None, arm, (Source(f"log {k}", str(k), 0.99),))
+        parts.append(Posterior({"name": str(k), "sha256": str(k), "seconds": 60.0, "rows": 60}, {}, (stored,), ()))
+    made, _ = update_model(told(*parts), FERRY, None, "ferry")
+    assert made is not None
+    x, y = (made.vessel_effects[0].parameters[name] for name in ("x", "y"))
+    assert x.value == pytest.approx(apart / 2.0)
+    assert not np.isfinite(x.high - x.low)
+    assert y.value == pytest.approx(0.7 + apart / 2.0)
+    # One estimate of all logs is no surer for being told of each.
+    assert y.high - y.low == pytest.approx(0.2 if not apart else 0.2 / np.sqrt(2.0))
 
 
 def test_what_is_doubtful_or_nothing_makes_no_model(fouled: str, folder: Path) -> None:
