@@ -119,20 +119,35 @@ def _compare(rate: str, of: str, seen: _Changes, least: float, known: tuple[tupl
     numbers = (
         f"whose slope is {gain:.3g} times it, 99 % interval {low:.3g} to {high:.3g}, correlation {correlation:.2f}"
     )
-    size = next((text for value, text in known if abs(abs(gain) / value - 1.0) < SIGNALS.unit_gain), "")
+    size, single = _unit(gain, low, high, known)
     certain = abs(correlation) > SIGNALS.certain_correlation
     if gain < 0:
         says = f"The {rate} has the wrong sign against the {of} ({numbers})" + (f", and {size}." if size else ".")
         return [Doubt(says, certain, _SIGN_REMEDIES[rate])]
     if (low > 1.0 or high < 1.0) and abs(gain - 1.0) > SIGNALS.gain_error:
-        remedy = size or (
-            f"check the scale of the {rate} in the profile"
-            + (", and the lever arm of what is measured away from the body origin" if of == "position" else "")
+        scale = f"check the scale of the {rate} in the profile" + (
+            ", and the lever arm of what is measured away from the body origin" if of == "position" else ""
         )
+        remedy = size if single else "; ".join(filter(None, (size, scale)))
         says = f"The {rate} does not match the {of} ({numbers}): {remedy}."
         tables = f"[signals.{_table(rate)}] or [signals.{of}]"
-        return [Doubt(says, certain and bool(size), f"correct the unit in {tables}")]
+        return [Doubt(says, certain and single, f"correct the unit in {tables}")]
     return []
+
+
+def _unit(gain: float, low: float, high: float, known: tuple[tuple[float, str], ...]) -> tuple[str, bool]:
+    """Return which unit explains the size of a gain, and whether it is the only one that its interval leaves open.
+
+    An interval that holds the right unit, one, shows no wrong one.
+    """
+    least, most = sorted((abs(low), abs(high))) if low * high > 0.0 else (0.0, max(abs(low), abs(high)))
+    if least <= 1.0 <= most:
+        return "", False
+    near = [text for value, text in known if abs(abs(gain) / value - 1.0) < SIGNALS.unit_gain]
+    held = [text for value, text in sorted(known) if text in near or least <= value <= most]
+    if len(held) > 1:
+        return f"{' or '.join(held)}, the interval holds both", False
+    return "".join(near), bool(near)
 
 
 def _range(seen: _Changes) -> tuple[float, float]:

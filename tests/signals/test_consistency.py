@@ -126,6 +126,34 @@ def test_a_tenth_is_found_in_clean_signals(name: str, gain: float) -> None:
     assert not finding.certain
 
 
+def noisy_scale(scale: float, noise: float) -> Track:
+    """A voyage whose surge velocity is `scale` times the position's slope, with slow errors of `noise` times its own size."""
+    u = voyage().columns["u"]
+    rng = np.random.default_rng(3)
+    slow = np.convolve(rng.standard_normal(T.size + 200), np.ones(201) / np.sqrt(201.0), mode="valid")
+    return voyage(u=scale * (u - noise * np.sqrt(np.mean(u**2)) * slow))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_an_interval_that_holds_several_units_names_them_and_picks_none(sign: float) -> None:
+    (doubt,) = cross_checks(noisy_scale(sign * 3.3, 0.36))
+    assert "km/h look read as m/s or knots look read as m/s, the interval holds both" in doubt.says
+    # A sign is certain whatever the unit; a unit that is one of several is no reason to refuse a log.
+    assert doubt.certain is (sign < 0.0)
+    assert ("check the scale of the surge velocity" in doubt.says) is (sign > 0.0)
+
+
+def test_an_interval_that_holds_one_unit_refuses_the_log_in_spite_of_noise() -> None:
+    (doubt,) = cross_checks(noisy_scale(3.6, 0.05))
+    assert doubt.says.endswith(": km/h look read as m/s.")
+    assert doubt.certain
+
+
+def test_an_interval_without_end_names_no_unit_with_a_wrong_sign() -> None:
+    (doubt,) = (one for one in cross_checks(noisy_scale(-1.3, 0.8)) if "wrong sign" in one.says)
+    assert "look read as" not in doubt.says
+
+
 @pytest.mark.slow
 def test_slow_noise_of_a_velocity_is_no_wrong_scale() -> None:
     """Errors of a navigation filter last for many seconds and attenuate the gain, by their size and by chance."""
