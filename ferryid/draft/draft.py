@@ -19,6 +19,7 @@ from ferryid.errors import FerryIdError
 from ferryid.ingest import open_log
 from ferryid.ingest.log import Topic
 from ferryid.ingest.parameters import parameters_of
+from ferryid.signals.artificial import simulator
 from ferryid.types import TimeRanges
 from ferryid.vessel.field_words import words_of
 from ferryid.vessel.profile import Profile
@@ -154,7 +155,7 @@ def draft_profile(log: str | Path, like: Profile | None = None, ranges: TimeRang
         notes,
         tuple(t.name for t in topics if t.name not in used),
         _left_over([t for t in topics if t.name in used], mapped, {(one.topic, one.path) for one in fields}, like),
-        driven.remarks,
+        (*((f"it is no recording of a vessel: {why}",) if (why := simulator(topics)) else ()), *driven.remarks),
     )
 
 

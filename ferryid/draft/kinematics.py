@@ -11,7 +11,8 @@ import numpy as np
 
 from ferryid.draft.fields import FieldGroup
 from ferryid.draft.mapped import MappedSignal, Motion, nearest_unit
-from ferryid.draft.samples import Samples, geodetic_unit, metres, yaw
+from ferryid.draft.reckoned import reckoned_positions
+from ferryid.draft.samples import Samples, angle_unit, geodetic_unit, metres, yaw
 from ferryid.draft.thresholds import DRAFT
 from ferryid.errors import FerryIdError
 from ferryid.types import Flags, Floats
@@ -60,6 +61,9 @@ class _Agreement:
 def navigation_signals(groups: Sequence[FieldGroup], samples: Samples) -> tuple[list[MappedSignal], Motion]:
     """Return the signals of pose, velocity and yaw rate that agree best, and the motion that they show."""
     groups = [one for one in groups if samples.has(one.topic, one.fields)]
+    reckoned = reckoned_positions(groups, samples)
+    if reckoned.left_out:
+        groups = [one for one in groups if one not in reckoned.why]
     chosen = _best(groups, samples)
     unknown = np.full(samples.grid_s.shape, np.nan)
     if chosen is None:
@@ -70,7 +74,9 @@ def navigation_signals(groups: Sequence[FieldGroup], samples: Samples) -> tuple[
     named = _named_frame(pose)
     found = []
     if pose.position is not None:
-        found.append(_position(pose, chosen, named))
+        mapped = _position(pose, chosen, named)
+        doubts = (*reckoned.doubts(pose.position), *mapped.doubts)
+        found.append(replace(mapped, evidence=(*mapped.evidence, *reckoned.evidence()), doubts=doubts))
     found.append(_heading(chosen, slope, named, groups, samples))
     if velocity is not None:
         found.append(_velocity(velocity, chosen, _others(groups, chosen, samples)))
@@ -178,7 +184,7 @@ def _named_frame(pose: _Pose) -> str:
 
 def _poses(position: FieldGroup | None, heading: FieldGroup, samples: Samples) -> list[_Pose]:
     """Return a position and a heading in every frame that they may be in."""
-    unit = "quaternion" if heading.form else _angle_unit(heading, samples)
+    unit = "quaternion" if heading.form else angle_unit(samples, heading.topic, heading.fields)
     angle = samples.smooth(
         samples.on_grid(heading.topic, yaw(samples, heading.topic, heading.fields, unit)), heading.topic
     )
@@ -207,18 +213,6 @@ def _poses(position: FieldGroup | None, heading: FieldGroup, samples: Samples) -
         for (frame, north, east), other in product(sides, [heading.frame] if heading.frame in _WORLD else _WORLD)
         if frame not in _WORLD or position is None or position.frame in ("", frame)
     ]
-
-
-def _angle_unit(heading: FieldGroup, samples: Samples) -> str:
-    stated = unit_of_name(heading.fields[0], "angle")
-    if stated:
-        return stated
-    words = set(words_of(heading.fields[0])) | set(words_of(heading.topic))
-    if words & {"deg", "degrees", "degree"}:
-        return "deg"
-    values = samples.raw(heading.topic, heading.fields[0])
-    known = values[np.isfinite(values)]
-    return "deg" if known.size and float(np.quantile(np.abs(known), 0.99)) > DRAFT.most_rad else "rad"
 
 
 def _agreement(pose: _Pose, velocity: FieldGroup | None, samples: Samples) -> _Agreement:

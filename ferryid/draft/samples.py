@@ -7,11 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ferryid.draft.thresholds import DRAFT
 from ferryid.errors import FerryIdError
 from ferryid.ingest.clocks import repair_all
 from ferryid.ingest.log import Reader, Series
 from ferryid.signals.time_ranges import spans_of
 from ferryid.types import Flags, Floats, TimeRanges
+from ferryid.vessel.field_words import unit_of_name, words_of
 from ferryid.vessel.frames import local_north_east, yaw_of_quaternion
 
 GRID_HZ = 5.0
@@ -54,6 +56,13 @@ class Samples:
     def raw(self, topic: str, path: str) -> Floats:
         """Return a field as recorded, shape (m,)."""
         return self.columns[topic, path]
+
+    def counts(self, topic: str) -> Flags:
+        """True on the rows of a topic that are used, shape (m,)."""
+        times = self.times_s[topic]
+        if self.used is None:
+            return np.ones(times.shape, dtype=bool)
+        return np.asarray(self.used[np.clip(np.searchsorted(self.grid_s, times), 0, self.used.size - 1)])
 
     def on_grid(self, topic: str, values: Floats, *, held: bool = False) -> Floats:
         """Return values of a topic on the grid, NaN outside of it and across gaps."""
@@ -144,6 +153,19 @@ def metres(samples: Samples, topic: str, fields: Sequence[str]) -> tuple[Floats,
     known = np.isfinite(latitude) & np.isfinite(longitude)
     north[known], east[known] = local_north_east(latitude[known] * turn, longitude[known] * turn)
     return north, east
+
+
+def angle_unit(samples: Samples, topic: str, fields: Sequence[str]) -> str:
+    """Return the unit of a heading: by its name, or by its size."""
+    stated = unit_of_name(fields[0], "angle")
+    if stated:
+        return stated
+    words = set(words_of(fields[0])) | set(words_of(topic))
+    if words & {"deg", "degrees", "degree"}:
+        return "deg"
+    values = samples.raw(topic, fields[0])
+    known = values[np.isfinite(values)]
+    return "deg" if known.size and float(np.quantile(np.abs(known), 0.99)) > DRAFT.most_rad else "rad"
 
 
 def yaw(samples: Samples, topic: str, fields: Sequence[str], unit: str) -> Floats:

@@ -51,7 +51,12 @@ class DraftThresholds:
         "an order that stays below it may be a pulse width",
         "convention: servos take 1000 to 2000 us, few 2200",
     )
-    fewest_rows: int = threshold(50, "rows", "fewer show nothing", "convention: ten seconds of the grid")
+    fewest_rows: int = threshold(
+        50,
+        "rows",
+        "fewer show nothing; of a receiver that many positions are taken in place of reckoned ones",
+        "convention: ten seconds of the grid",
+    )
     jump: float = threshold(
         3.0,
         "of the speed that nine tenths of the rows do not exceed",

@@ -8,11 +8,14 @@ a point that cannot drift.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from ferryid.signals.stream import Recording, Stream
+from ferryid.ingest.log import Topic
+from ferryid.signals.stream import Recording
 from ferryid.signals.thresholds import SIGNALS
-from ferryid.types import Ints
+from ferryid.types import Floats, Ints, Nanoseconds
 
 SIMULATORS = (
     "gazebo_msgs/",
@@ -23,49 +26,59 @@ SIMULATORS = (
 )
 """Beginnings of the names of messages that simulators alone send."""
 VELOCITIES = (("u", "v"), ("vel_N", "vel_E"))
+ALONG = (
+    "each step of its positions points along the heading to the last digit, as if no vessel drifted in a turn: they are "
+    "simulated, or one is reckoned from the other, and not measured"
+)
+"""Of a log whose positions are those of `along_share`."""
 
 
 def artificial(recording: Recording) -> str:
     """Return what shows that a log is no recording of a vessel, as the end of a sentence; empty where nothing does."""
-    for topic in recording.topics:
+    return simulator(recording.topics) or _summed(recording) or _along(recording)
+
+
+def simulator(topics: Sequence[Topic]) -> str:
+    """Return which topic holds messages that simulators alone send, as the end of a sentence; empty where none does."""
+    for topic in topics:
         if topic.count and topic.type.startswith(SIMULATORS):
             return f"its topic {topic.name} holds messages of a simulator ({topic.type})"
-    return _summed(recording) or _along(recording)
+    return ""
 
 
 def _along(recording: Recording) -> str:
     """Return that positions move exactly along the heading; empty where they do not."""
     place = next((one for one in recording.streams.values() if {"x", "y"} <= set(one.columns)), None)
     turn = next((one for one in recording.streams.values() if "psi" in one.columns), None)
-    if place is None or turn is None or along_share(place, turn) < SIGNALS.summed_share:
+    if place is None or turn is None:
         return ""
-    return (
-        "each step of its positions points along the heading to the last digit, as if no vessel drifted in a turn: they are "
-        "simulated, or one is reckoned from the other, and not measured"
-    )
+    share = along_share(place.time_ns, place.columns["x"], place.columns["y"], turn.time_ns, turn.columns["psi"])
+    return ALONG if share >= SIGNALS.summed_share else ""
 
 
-def along_share(place: Stream, turn: Stream) -> float:
+def along_share(
+    time: Nanoseconds | Floats, x: Floats, y: Floats, heading_time: Nanoseconds | Floats, psi: Floats
+) -> float:
     """Return the share of steps of the position that point along a heading at about their time.
 
     0 where the vessel hardly moves or turns, which shows nothing.
 
     Parameters
     ----------
-    place
-        With columns ``x`` and ``y`` [m].
-    turn
-        With a column ``psi`` [rad].
+    time, x, y
+        Times, and the position at them [m], shape (n,).
+    heading_time, psi
+        Times on the same clock and in the same unit, and the heading at them, from x towards y [rad], shape (m,).
     """
-    north, east = np.diff(place.columns["x"]), np.diff(place.columns["y"])
-    length, psi = np.hypot(north, east), turn.columns["psi"]
+    north, east = np.diff(x), np.diff(y)
+    length = np.hypot(north, east)
     moving = np.isfinite(length) & (length > SIGNALS.along_step * np.nanmax(length, initial=0.0))
     known = np.isfinite(psi)
     if np.count_nonzero(moving) < SIGNALS.summed_steps or not known.any():
         return 0.0
     if np.ptp(np.unwrap(psi[known])) < SIGNALS.along_turn_rad:
         return 0.0
-    at: Ints = np.searchsorted(turn.time_ns, place.time_ns[1:])
+    at: Ints = np.searchsorted(heading_time, time[1:])
     course = np.arctan2(east, north)
     away = np.full(len(course), np.inf)
     for shift in range(-SIGNALS.along_samples, SIGNALS.along_samples + 1):
@@ -80,26 +93,35 @@ def _summed(recording: Recording) -> str:
         for names in VELOCITIES:
             if not all(name in stream.columns for name in ("x", "y", *names)):
                 continue
-            if summed_share(stream, names) >= SIGNALS.summed_share:
-                sway = stream.columns[names[1]]
-                still = (
-                    ", and the sway velocity is zero throughout" if names == VELOCITIES[0] and not sway.any() else ""
-                )
-                return (
-                    f"each step of its positions is the speed of {stream.topic} times one length of time to the last "
-                    f"digit{still}: they are simulated, or reckoned from the velocities, and not measured"
-                )
+            first, second = (stream.columns[name] for name in names)
+            if summed_share(stream.columns["x"], stream.columns["y"], first, second) >= SIGNALS.summed_share:
+                return summed_says(stream.topic, still=names == VELOCITIES[0] and not second.any())
     return ""
 
 
-def summed_share(stream: Stream, velocity: tuple[str, str]) -> float:
+def summed_says(topic: str, *, still: bool) -> str:
+    """Return that the positions of a topic are the sum of its velocities, and that the sway is zero if it is `still`."""
+    return (
+        f"each step of its positions is the speed of {topic} times one length of time to the last digit"
+        f"{', and the sway velocity is zero throughout' if still else ''}: they are simulated, or reckoned from the "
+        "velocities, and not measured"
+    )
+
+
+def summed_share(x: Floats, y: Floats, first: Floats, second: Floats) -> float:
     """Return the share of steps of the position that are the speed before or after them times one length of time.
 
     Lengths are compared, so that no heading is needed; 0 where the vessel hardly moves or its speed is all but constant, which
     shows nothing.
+
+    Parameters
+    ----------
+    x, y
+        Position [m], shape (n,).
+    first, second
+        Components of the velocity at the same times, in any unit and frame, shape (n,).
     """
-    step = np.hypot(np.diff(stream.columns["x"]), np.diff(stream.columns["y"]))
-    speed = np.hypot(*(stream.columns[name] for name in velocity))
+    step, speed = np.hypot(np.diff(x), np.diff(y)), np.hypot(first, second)
     best = 0.0
     for beside in (speed[:-1], speed[1:]):
         moving = np.isfinite(step) & (beside > SIGNALS.summed_digits * np.nanmax(speed, initial=0.0))

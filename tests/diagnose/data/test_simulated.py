@@ -115,11 +115,13 @@ def test_positions_exactly_along_the_heading_are_no_measurement() -> None:
 
 def test_a_straight_course_along_the_heading_shows_nothing() -> None:
     straight = replace(placed(), columns={"x": np.arange(600) * 0.1, "y": np.zeros(600)})
-    assert along_share(straight, heading(rate=0.0)) == 0.0
+    turn = heading(rate=0.0)
+    x, y = (straight.columns[name] for name in "xy")
+    assert along_share(straight.time_ns, x, y, turn.time_ns, turn.columns["psi"]) == 0.0
 
 
 def test_steps_of_a_constant_speed_show_nothing() -> None:
-    assert summed_share(reckoned(varied=0.0), ("u", "v")) == 0.0
+    assert summed_share(*(reckoned(varied=0.0).columns[name] for name in "xyuv")) == 0.0
 
 
 def test_velocities_that_come_from_positions_say_nothing() -> None:
