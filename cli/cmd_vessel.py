@@ -87,7 +87,7 @@ def _asked(question: Question) -> str:
             return ""
         if question.accepts(answer):
             return answer
-        tell(f"{answer!r} is no answer here")
+        tell(f"{answer!r} is no answer here: give {question.wanted}")
 
 
 @app.command(cls=PlainCommand)

@@ -53,6 +53,13 @@ class Question:
     text: str
     hint: str
 
+    @property
+    def wanted(self) -> str:
+        """What an answer has to be, to stand after "give"."""
+        if self.key.endswith(".order"):
+            return "order or measured"
+        return "a number without a unit" if self.key.endswith(_ANY_SIGN) else "a number above 0, without a unit"
+
     def accepts(self, answer: str) -> bool:
         """Tell whether a text answers it: a number, or a word that begins as one of its choices; or nothing."""
         answer = answer.strip().lower()
@@ -143,8 +150,10 @@ def as_text(draft: Draft, file: str, text: str) -> str:
             lines += [f"  {'':<{wide}}    check: {doubt}" for doubt in place.doubts]
     lines += [f"  check: {remark}" for remark in draft.remarks]
     lines += [f"  not mapped of {topic}: {', '.join(paths)}" for topic, paths in _by_topic(draft).items()]
-    count = open_lines(text)
-    todo = f"fill in {counted(count, 'line')} marked {MARK.removeprefix('# ').rstrip(':')}, then " if count else ""
+    count, mark = open_lines(text), MARK.removeprefix("# ").rstrip(":")
+    # A profile can do without the areas that a wind acts on.
+    wind = " (those of [wind] only if a wind is to be tested)" if f"{MARK} [wind]" in text else ""
+    todo = f"fill in {counted(count, 'line')} marked {mark}{wind}, then " if count else ""
     lines.append(f"next    {todo}ferryid vessel check {file}, ferryid inspect {draft.log}, ferryid fit {draft.log}")
     return "\n".join(lines)
 

@@ -242,13 +242,14 @@ def accept_estimate(
         excitation=excitation,
         free_run_base=free_base,
         free_run_model=free_new,
+        # Those of the model first: a season has many logs with something to say each.
         warnings=(
             *final.held,
-            *data.warnings(excitation, scores),
             *free_run_warnings(free_base, free_new),
             *sign_changes(model),
             *told.condition_notes,
             *final.notes,
+            *data.warnings(excitation, scores),
         ),
         logs=logs,
         archive=data.archived_logs(found),

@@ -47,7 +47,7 @@ def test_a_draft_beside_the_log_is_what_the_next_command_uses(ferryid, log: Path
 def test_without_a_person_lines_are_marked(ferryid, log: Path) -> None:
     run = ferryid("vessel", "new", log, "--name", "boat")
     assert run.code == 0
-    assert "lines marked FILL IN, then ferryid vessel check" in run.out
+    assert "lines marked FILL IN (those of [wind] only if a wind is to be tested), then ferryid vessel check" in run.out
     assert "# FILL IN: mass_kg" in (log.parent / "vessel.toml").read_text(encoding="utf-8")
     run = ferryid("fit", log)
     assert run.code == 2
@@ -66,7 +66,8 @@ def test_a_person_is_asked_until_the_answer_is_one(ferryid, log: Path, monkeypat
     monkeypatch.setattr(type(sys.stderr), "isatty", lambda self: True, raising=False)
     run = ferryid("vessel", "new", log)
     assert run.code == 0, run.err
-    assert "'five' is no answer here" in run.err
+    assert "'five' is no answer here: give a number above 0, without a unit\n" in run.err
+    assert "next    ferryid vessel check" in run.out
     text = (log.parent / "vessel.toml").read_text(encoding="utf-8")
     assert "FILL IN:" not in text.partition("[hull]")[2]
     assert "position_m = [-1.8, 0]" in text

@@ -321,7 +321,9 @@ def test_answers_complete_a_draft(tmp_path: Path) -> None:
     assert profile.wind.lateral_m2 == 1.8
     assert profile.actuators[1].position_m == (-1.8, 1.8)
     assert not any(Question("thruster1.full", "", "").accepts(one) for one in ("five", "0", "-3", "inf"))
-    assert Question("thruster1.x_m", "", "").accepts("-1.8")
+    place, order = Question("thruster1.x_m", "", ""), Question("a.order", "", "")
+    assert place.accepts("-1.8")
+    assert (place.wanted, order.wanted) == ("a number without a unit", "order or measured")
     assert Question("a.order", "", "").accepts("order")
 
 

@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 
 from ferryid.errors import FerryIdError
-from ferryid.identify import inputs
+from ferryid.identify import inputs, pipeline
 from ferryid.identify.inertia import axes_without_force, implausible_inertia, without_inertia
 from ferryid.identify.outcome import FitOutcome
 from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.settings import FitSettings
 from ferryid.models.forces.estimator import effective_mass, model_estimator
 from ferryid.signals.prepare import Opened, open_track
+from ferryid.signals.track import Doubt
 from ferryid.types import RunContext
 from ferryid.vessel import load_profile
 
@@ -71,6 +72,20 @@ def test_validation_rows_do_not_reach_the_coefficients(monkeypatch: pytest.Monke
     poisoned = fitted(monkeypatch, replace(opened, measured=replace(motion, tau=poison)))
     np.testing.assert_array_equal(poisoned.judged.theta, honest.judged.theta)
     assert not poisoned.acceptance.accepted or poisoned.acceptance.normalised_mse != honest.acceptance.normalised_mse
+
+
+@pytest.mark.slow
+def test_warnings_of_the_model_come_before_those_of_single_logs(
+    monkeypatch: pytest.MonkeyPatch, opened: Opened
+) -> None:
+    doubt = Doubt("The yaw rate does not match the heading.", certain=False)
+    monkeypatch.setattr(pipeline, "free_run_warnings", lambda *_: ("Run free for 5 s it turns in circles.",))
+    result = fitted(monkeypatch, replace(opened, track=replace(opened.track, doubts=(doubt,))))
+    of_model, of_log = (
+        next(k for k, one in enumerate(result.warnings) if one.endswith(says))
+        for says in ("it turns in circles.", doubt.says)
+    )
+    assert of_model < of_log
 
 
 @pytest.mark.slow
