@@ -47,6 +47,8 @@ GROUPS = ("A", "B")
 """The logs that are named first, and those that they are compared with."""
 OF_HULL = frozenset({"fouling"})
 """What a single log shows beside a hull model alone, and groups beside the hull that they share."""
+FAULTS = frozenset({"thruster_gain"})
+"""Factors of force. One of the groups has less than the other: a loss in the one, as no actuator gains force of itself."""
 ALL_THRUSTERS = "all"
 """Instance of a change of force that all actuators have in common, as by a weak battery."""
 SCATTERS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6)
@@ -104,9 +106,9 @@ def grouped_as(campaign: Campaign, other: Campaign) -> Campaign:
 def differences_of(campaign: Campaign) -> list[Candidate]:
     """Return every difference that no log rules out and, of an actuator, some log of each group can show.
 
-    One whose neutral value is an end of what is possible, as a lag or a load, may act in either group. The shape of a thrust
-    curve is as uncertain in one group as in the other: that it differs is sought beside the same shape in all logs only, or an
-    error of the curve would be taken for a difference.
+    One whose neutral value is an end of what is possible, as a lag, a load or a loss of force, may act in either group. The
+    shape of a thrust curve is as uncertain in one group as in the other: that it differs is sought beside the same shape in all
+    logs only, or an error of the curve would be taken for a difference.
     """
     shared = {one.key for one in campaign.properties if not one.group}
     profile = campaign.members[0].windows.measurements.profile
@@ -116,12 +118,22 @@ def differences_of(campaign: Campaign) -> list[Candidate]:
         if not lasts or one.choose is not None or one.unsteady is not None or _untestable(one, campaign):
             continue
         for instance in one.instances(profile):
-            candidate = Candidate.of(one, instance, profile)
+            candidate = _as_loss(Candidate.of(one, instance, profile))
             if one.of_thrust_curve and candidate.key not in shared:
                 continue
             if candidate.parameters and _shown_in_each_group(candidate, campaign):
                 found += [replace(candidate, group=group) for group in _groups(candidate)]
     return [*found, *_all_thrusters(campaign)]
+
+
+def _as_loss(candidate: Candidate) -> Candidate:
+    """Return a factor of force as a loss; beside a hull that is known, less in one group is not more in the other."""
+    if candidate.effect.id not in FAULTS:
+        return candidate
+    first, *rest = candidate.parameters
+    # At its end a limit has no slope.
+    lost = replace(first, high=first.neutral, start=first.neutral - 0.5 * first.size)
+    return replace(candidate, parameters=(lost, *rest))
 
 
 def _groups(candidate: Candidate) -> tuple[str, ...]:
@@ -150,7 +162,8 @@ def _all_thrusters(campaign: Campaign) -> list[Candidate]:
     if len(profile.actuators) < 2:
         return []
     gain = replace(effects()["thruster_gain"], apply=_scaled)
-    return [replace(Candidate.of(gain, ALL_THRUSTERS, profile), group=GROUPS[1])]
+    candidate = _as_loss(Candidate.of(gain, ALL_THRUSTERS, profile))
+    return [replace(candidate, group=group) for group in _groups(candidate)]
 
 
 def _scaled(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:

@@ -143,11 +143,11 @@ class InferenceThresholds:
         "logs that begin later than this after the end of those before are of another session, with weather of its own",
         "convention: a wind keeps its strength and direction for some hours, and a crew goes out in the morning or after noon",
     )
-    load_logs: int = threshold(
+    change_logs: int = threshold(
         2,
         "logs",
-        "on either side of a time between logs at which a load may have come aboard or gone ashore, at least",
-        "derived: the logs of a side must scatter, or a load cannot be separated from what one log differs by from another",
+        "on either side of a time between logs at which a load or a thruster's force may have changed, at least",
+        "derived: the logs of a side must scatter, or a change cannot be separated from what one log differs by from another",
     )
     fewest_steps: int = threshold(
         10, "steps", "shorter stretches are left out", "convention: half a window, from which no noise is estimated"

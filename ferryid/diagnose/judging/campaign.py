@@ -10,7 +10,7 @@ from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.campaign import CommonHull
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit, bare_campaign, estimate_campaign
 from ferryid.diagnose.inference.campaign_model import Campaign
-from ferryid.diagnose.inference.campaign_properties import properties_of, with_property
+from ferryid.diagnose.inference.campaign_properties import properties_of
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.group_differences import grouped_as
 from ferryid.diagnose.inference.thresholds import INFERENCE
@@ -18,10 +18,10 @@ from ferryid.diagnose.judging.campaign_conditions import JudgedConditions, judge
 from ferryid.diagnose.judging.campaign_errors import LogErrors
 from ferryid.diagnose.judging.campaign_evidence import HeldOutLoss, held_out_loss, without_conditions
 from ferryid.diagnose.judging.campaign_properties import PropertyTest, judge_properties, tested
+from ferryid.diagnose.judging.changes_between_logs import ChangeTest, judge_change
 from ferryid.diagnose.judging.claims import Claim, Figures
 from ferryid.diagnose.judging.credibility import campaign_hull
 from ferryid.diagnose.judging.finding import Finding
-from ferryid.diagnose.judging.load_changes import LoadChangeTest, judge_load_change
 from ferryid.diagnose.judging.posterior import HullPosterior
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.force_model import COEFFICIENTS, ForceModel
@@ -37,8 +37,8 @@ class JudgedCampaign:
         Of each log, with the hull of all.
     properties
         Of the vessel.
-    load
-        A load that is aboard in some of the logs; None where the evidence favours none.
+    change
+        A load or a loss of force in some of the logs; None where the evidence favours none.
     bare, loss
         The logs without what is confirmed, under the same noise, and the loss of held-out blocks without and with it; None
         where nothing is confirmed.
@@ -46,7 +46,7 @@ class JudgedCampaign:
 
     conditions: JudgedConditions
     properties: tuple[PropertyTest, ...]
-    load: LoadChangeTest | None = None
+    change: ChangeTest | None = None
     bare: CampaignFit | None = None
     loss: tuple[HeldOutLoss, HeldOutLoss] | None = None
 
@@ -88,8 +88,8 @@ class JudgedCampaign:
     @property
     def notes(self) -> tuple[str, ...]:
         """What was tested over all logs, as sentences."""
-        load = () if self.load is None else (self.load.says,)
-        return (*load, *(note(one, self.hull.place) for one in self.conditions.tests))
+        change = () if self.change is None else (self.change.says,)
+        return (*change, *(note(one, self.hull.place) for one in self.conditions.tests))
 
     def claims(self, path: str) -> tuple[Claim, ...]:
         """Return what all logs together say of one of them, as findings."""
@@ -101,9 +101,9 @@ class JudgedCampaign:
             Claim(one.finding(windows), Figures("property", beyond_feedback=one.beyond_feedback))
             for one in self.properties
         )
-        load = None if self.load is None else self.load.finding(i)
-        aboard = () if load is None else (Claim(load, Figures("property")),)
-        return (*self.conditions.claims(path), *lasting, *aboard)
+        change = None if self.change is None else self.change.finding(i)
+        changed = () if change is None else (Claim(change, Figures("property")),)
+        return (*self.conditions.claims(path), *lasting, *changed)
 
     def errors(self, path: str, findings: Sequence[Finding]) -> LogErrors | None:
         """Return the held-out errors of a log without and with what is confirmed over all logs; None where it shows none of it.
@@ -127,44 +127,37 @@ class JudgedCampaign:
 def judge_campaign(campaign: Campaign, place: Mapping[str, int], progress: Callable[[str], None]) -> JudgedCampaign:
     """Judge what several logs say together.
 
-    Conditions come first, then properties beside them, then a load that is aboard in some of the logs beside both; conditions
-    are judged again beside what is confirmed.
+    Conditions come first, then properties beside them, then a load or a loss of force that is in some of the logs. Beside a
+    confirmed one, conditions and properties are judged from the beginning: what they stood in for would be counted twice.
     """
     bare = estimate_campaign(bare_campaign(campaign))
 
     def judged(one: Campaign) -> JudgedConditions:
         return judge_conditions(one, place, progress, bare)
 
-    alone = judged(campaign)
-    found = _beside(campaign, alone, judge_properties(alone.hull.fit, progress), judged)
-    progress("weighing loads that came aboard or were put ashore between logs")
-    load = judge_load_change(found[0].hull.fit, place)
-    if load is not None and load.confirmed:
-        aboard = _begun(load.change.candidate, load.difference.estimates)
-        parted = grouped_as(campaign, load.fit.campaign)
-        beside = _beside(parted, alone, _beside_load(load.fit, found[1]), judged, (aboard,))
-        again = load.beside(beside[0].hull.fit, aboard)
-        # A load that conditions beside it explain is none.
-        load, found = (again, beside) if again.confirmed else (None, found)
-    conditions, properties = found
-    return JudgedCampaign(conditions, properties, load, *_without_confirmed(conditions))
+    conditions, properties = _judged(campaign, judged, progress)
+    progress("weighing what may have changed between logs")
+    change = judge_change(conditions.hull.fit, place)
+    if change is not None and change.confirmed:
+        acting = _begun(change.change.candidate, change.difference.estimates)
+        parted = grouped_as(campaign, change.fit.campaign)
+        beside = _judged(replace(parted, properties=(acting,)), judged, progress)
+        again = change.beside(beside[0].hull.fit, acting)
+        # A change that conditions or properties beside it explain is none.
+        change, (conditions, properties) = (again, beside) if again.confirmed else (None, (conditions, properties))
+    return JudgedCampaign(conditions, properties, change, *_without_confirmed(conditions))
 
 
-def _beside(
-    campaign: Campaign,
-    alone: JudgedConditions,
-    properties: tuple[PropertyTest, ...],
-    judged: Callable[[Campaign], JudgedConditions],
-    loads: tuple[Candidate, ...] = (),
+def _judged(
+    campaign: Campaign, judged: Callable[[Campaign], JudgedConditions], progress: Callable[[str], None]
 ) -> tuple[JudgedConditions, tuple[PropertyTest, ...]]:
-    """Return conditions judged beside confirmed properties and loads, and the properties tested beside these.
-
-    `alone` are the conditions where nothing is beside them.
-    """
-    conditions = alone
+    """Return conditions judged beside the properties that are confirmed, and the properties tested beside these."""
+    alone = judged(campaign)
+    conditions, acting = alone, campaign.properties
+    properties = tuple(one for one in judge_properties(alone.hull.fit, progress) if one.candidate not in acting)
     confirmed = tuple(_begun(one.candidate, one.estimates) for one in properties if one.confirmed)
-    while confirmed or loads:
-        conditions = judged(replace(campaign, properties=(*confirmed, *loads)))
+    while confirmed:
+        conditions = judged(replace(campaign, properties=(*confirmed, *acting)))
         again = {one.key: tested(conditions.hull.fit, one, ()) for one in confirmed}
         held = tuple(one for one in confirmed if again[one.key].evidence >= INFERENCE.prior_odds)
         # What the evidence does not speak for beside the conditions is no hint either, and acts no longer.
@@ -178,19 +171,6 @@ def _beside(
             break
         confirmed, conditions = held, alone
     return conditions, properties
-
-
-def _beside_load(made: CampaignFit, properties: tuple[PropertyTest, ...]) -> tuple[PropertyTest, ...]:
-    """Return properties with those that are not confirmed tested again beside a load, which they may have stood in for."""
-    found = []
-    for one in properties:
-        if not one.confirmed:
-            begun = with_property(made, _begun(one.candidate, one.estimates))
-            fit = estimate_campaign(begun.campaign, noise=made.noise, begin=begun)
-            one = replace(tested(fit, fit.campaign.properties[-1], ()), rivals=one.rivals, alike=one.alike)
-        if one.evidence >= INFERENCE.prior_odds:
-            found.append(one)
-    return tuple(found)
 
 
 def _begun(candidate: Candidate, estimates: Mapping[str, Estimate]) -> Candidate:

@@ -7,12 +7,14 @@ with what was found taken off.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import nan
 
 import numpy as np
 
 from ferryid.diagnose.data.measurements import Survey
 from ferryid.diagnose.inference.estimation import Candidate
+from ferryid.diagnose.inference.group_differences import ALL_THRUSTERS, GROUPS
 from ferryid.diagnose.judging.campaign import JudgedCampaign
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.posterior import Posterior, stored_effect, trained
@@ -47,6 +49,7 @@ def campaign_posterior(
     conditions, vessel = list[StoredEffect](), list[StoredEffect]()
     if i is not None:
         here = {one.key for one in fit.campaign.members[i].conditions}
+        names = fit.campaign.members[i].windows.measurements.names
         values, lasting = fit.campaign.values(fit.common, fit.own[i])
         conditions = [
             _stored(one, p, reported[one.key], survey)
@@ -55,9 +58,9 @@ def campaign_posterior(
         ]
         for one, p in zip(fit.campaign.properties, lasting, strict=True):
             if one.key in reported:
-                # What was aboard in all logs may not be in the next one.
-                kind = vessel if one.effect.vessel else conditions
-                kind.append(_stored(one, p, reported[one.key], survey))
+                # What was aboard may not be in the next log, and what came back after earlier logs is not lost any more.
+                kind = vessel if one.effect.vessel and one.group != GROUPS[0] else conditions
+                kind += [_stored(each, p, reported[one.key], survey) for each in _one_by_one(one, names)]
     if own is not None:
         # What all logs say of a property stands above what one of them says.
         shared = {one.key for one in vessel}
@@ -74,6 +77,13 @@ def campaign_posterior(
         together.hull_doubt,
         () if own is None else own.notes,
     )
+
+
+def _one_by_one(candidate: Candidate, names: Sequence[str]) -> list[Candidate]:
+    """Return what all actuators have in common as that of each: a model knows no other."""
+    if candidate.instance != ALL_THRUSTERS:
+        return [candidate]
+    return [replace(candidate, instance=name) for name in names]
 
 
 def _stored(candidate: Candidate, values: Floats, finding: Finding, survey: Survey) -> StoredEffect:

@@ -21,6 +21,7 @@ import numpy as np
 from ferryid.cached import cached_property
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit, estimate_campaign
 from ferryid.diagnose.inference.campaign_model import Campaign
+from ferryid.diagnose.inference.changes_between_logs import find_change
 from ferryid.diagnose.judging.campaign_evidence import Gain, held_out_blocks, without_conditions
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.side_by_side import over
@@ -67,6 +68,8 @@ class Split:
 def find_split(campaign: Campaign, reference: Flags) -> Split | None:
     """Return how a campaign falls into two parts that no common hull fits; None where one fits all.
 
+    A load that came aboard between logs, or a thruster that weakened, is no other hull: beside it the logs are judged again.
+
     Parameters
     ----------
     campaign
@@ -74,6 +77,14 @@ def find_split(campaign: Campaign, reference: Flags) -> Split | None:
     reference
         Which of them are references, shape (L,).
     """
+    split = _found(campaign, reference)
+    if split is None:
+        return None
+    change = find_change(estimate_campaign(campaign))
+    return split if change is None else _found(change.fit.campaign, reference)
+
+
+def _found(campaign: Campaign, reference: Flags) -> Split | None:
     bare = _judged(estimate_campaign(without_conditions(campaign)), _ways(reference))
     likely = [one for one in bare if one.likely]
     # Where a wind that nobody measured is most of the force error, another hull makes little of it.

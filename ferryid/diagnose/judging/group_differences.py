@@ -188,11 +188,9 @@ def judge_groups(campaign: Campaign, progress: Callable[[str], None]) -> JudgedG
     progress("testing the differences on held-out stretches")
     judged = [judged_difference(made, one, contenders) for one, contenders in found]
     judged.sort(key=lambda one: (bool(one.doubt), -one.evidence))
-    taken = {(one.candidate.key, one.candidate.group) for one in judged}
-    rest = [one for one in differences_of(made.campaign) if (one.key, one.group) not in taken]
+    taken = {one.candidate.key for one in judged}
     # One that may act in either group is shown once: its estimate has the other sign.
-    either = {one.key for one in rest if one.group == GROUPS[1]} | {key for key, _ in taken}
-    rest = [one for one in rest if one.group == GROUPS[1] or one.key not in either]
+    rest = {one.key: one for one in differences_of(made.campaign) if one.key not in taken}.values()
     compared = over(partial(compare_near, made), rest)
     return JudgedGroups(
         tuple(judged),

@@ -9,8 +9,8 @@ import pytest
 
 from ferryid.diagnose.judging.campaign import JudgedCampaign
 from ferryid.effects.force_model import Measurements
+from tests.diagnose.judging.test_changes_between_logs import judged, member_of, together
 from tests.diagnose.judging.test_held_out import sailed
-from tests.diagnose.judging.test_load_changes import judged, member_of, together
 
 pytestmark = pytest.mark.slow
 

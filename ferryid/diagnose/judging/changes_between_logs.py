@@ -1,4 +1,4 @@
-"""A load that came aboard, or was put ashore, between two logs of a campaign, judged on held-out stretches of its logs."""
+"""What changed between two logs of a campaign, a load or a thruster's force, judged on held-out stretches of its logs."""
 
 from __future__ import annotations
 
@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from ferryid.counts import counted
+from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit
-from ferryid.diagnose.inference.campaign_properties import without_property
+from ferryid.diagnose.inference.campaign_properties import LOADS, without_property
 from ferryid.diagnose.inference.candidate import Candidate
-from ferryid.diagnose.inference.load_changes import LoadChange, find_load_change
+from ferryid.diagnose.inference.changes_between_logs import Change, find_change
+from ferryid.diagnose.inference.group_differences import ALL_THRUSTERS
 from ferryid.diagnose.judging.campaign_errors import LogErrors
 from ferryid.diagnose.judging.campaign_evidence import HeldOutLoss, held_out_loss
 from ferryid.diagnose.judging.finding import Finding
@@ -22,13 +24,13 @@ from ferryid.types import AXES
 
 
 @dataclass(frozen=True)
-class LoadChangeTest:
-    """What speaks for a load that is aboard in the logs on one side of a time alone.
+class ChangeTest:
+    """What speaks for a load or a fault that acts in the logs on one side of a time alone.
 
     Attributes
     ----------
     change
-        The load, and the logs in which it is aboard.
+        The load or fault, and the logs in which it acts.
     difference
         The same as a difference between the logs after the time and those before it.
     loss
@@ -37,7 +39,7 @@ class LoadChangeTest:
         Of the last log before the time and of the first one after it.
     """
 
-    change: LoadChange
+    change: Change
     difference: Difference
     loss: tuple[HeldOutLoss, HeldOutLoss]
     names: tuple[str, str]
@@ -55,21 +57,19 @@ class LoadChangeTest:
     @property
     def says(self) -> str:
         """What it is, as sentences."""
-        mass, x = (self.difference.estimates[name].value for name in ("mass", "x"))
-        when, how = ("before", "came aboard") if self.change.after else ("after", "was put ashore")
-        text = (
-            f"Aboard were {mass:.0f} kg more than in the {counted(len(self.change.ashore), 'log')} {when}, {whereabouts(x)}: "
-            f"a load {how} between {self.names[0]} and {self.names[1]}."
-        )
+        says = _load if self.change.candidate.effect.id in LOADS else _loss_of_force
+        others = f"in the {counted(len(self.change.others), 'log')} {'before' if self.change.after else 'after'}"
+        what, how = says(self.change, self.difference.estimates, others)
+        text = f"{what}: {how} between {self.names[0]} and {self.names[1]}."
         return text if self.confirmed else f"{text} It is estimated, not confirmed: {self.difference.doubt}."
 
-    def beside(self, made: CampaignFit, candidate: Candidate) -> LoadChangeTest:
-        """Return what speaks for it in another estimate of the same groups, of which `candidate` is the load."""
+    def beside(self, made: CampaignFit, candidate: Candidate) -> ChangeTest:
+        """Return what speaks for it in another estimate of the same groups, in which it is `candidate`."""
         return _tested(replace(self.change, fit=made, candidate=candidate), self.names)
 
     def finding(self, i: int) -> Finding | None:
-        """Return it as a finding on a log; None where it is not aboard."""
-        if i not in self.change.aboard:
+        """Return it as a finding on a log; None where it does not act."""
+        if i not in self.change.acting:
             return None
         errors = LogErrors.of(self.fit, self.loss, i)
         improvement = errors.removed
@@ -78,7 +78,7 @@ class LoadChangeTest:
         t = errors.windows.measurements.t
         return Finding(
             effect=self.change.candidate.effect.id,
-            instance=None,
+            instance=self.change.candidate.instance,
             probability=self.difference.probability,
             parameters=self.difference.estimates,
             axes=dict(zip(AXES, shares.tolist(), strict=True)),
@@ -94,12 +94,27 @@ class LoadChangeTest:
         )
 
 
-def judge_load_change(made: CampaignFit, place: Mapping[str, int]) -> LoadChangeTest | None:
-    """Find a load that is aboard in some of the logs, and judge it; None where the evidence favours none.
+def _load(change: Change, estimates: Mapping[str, Estimate], others: str) -> tuple[str, str]:
+    """Return what is aboard, and how it came to be so."""
+    mass, x = (estimates[name].value for name in ("mass", "x"))
+    how = "a load came aboard" if change.after else "a load was put ashore"
+    return f"Aboard were {mass:.0f} kg more than {others}, {whereabouts(x)}", how
+
+
+def _loss_of_force(change: Change, estimates: Mapping[str, Estimate], others: str) -> tuple[str, str]:
+    """Return how much less force there is, and how that came to be so."""
+    whose = change.candidate.instance
+    gave = "Every actuator gave" if whose == ALL_THRUSTERS else f"{whose} gave"
+    how = "it weakened" if change.after else "it came back"
+    return f"{gave} {100.0 * estimates['factor'].value:.0f} % of the force that it had {others}", how
+
+
+def judge_change(made: CampaignFit, place: Mapping[str, int]) -> ChangeTest | None:
+    """Find a load or a loss of force in some of the logs, and judge it; None where the evidence favours none.
 
     `place` is which of the logs each path is.
     """
-    change = find_load_change(made)
+    change = find_change(made)
     if change is None:
         return None
     paths = {i: path for path, i in place.items()}
@@ -107,8 +122,8 @@ def judge_load_change(made: CampaignFit, place: Mapping[str, int]) -> LoadChange
     return _tested(change, (last, first))
 
 
-def _tested(change: LoadChange, names: tuple[str, str]) -> LoadChangeTest:
+def _tested(change: Change, names: tuple[str, str]) -> ChangeTest:
     fit = change.fit
     difference = judged_difference(fit, change.candidate, change.contenders)
     loss = held_out_loss(without_property(fit, change.candidate)), held_out_loss(fit)
-    return LoadChangeTest(change, difference, loss, names)
+    return ChangeTest(change, difference, loss, names)

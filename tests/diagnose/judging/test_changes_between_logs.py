@@ -1,4 +1,4 @@
-"""A load that comes aboard between logs is found with its mass, place and time; logs that are alike carry none."""
+"""A load that comes aboard between logs, and a thruster that weakens, are found with size and time; alike logs have neither."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import pytest
 from ferryid.diagnose.data.measurements import window_lengths
 from ferryid.diagnose.inference.campaign_logs import Member
 from ferryid.diagnose.inference.campaign_model import INDUCED, Campaign, HullPrior
+from ferryid.diagnose.inference.group_differences import ALL_THRUSTERS
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.campaign import JudgedCampaign, judge_campaign
 from ferryid.effects.force_model import ForceModel, Measurements, hull_of
@@ -63,18 +64,18 @@ def judged(whole: Campaign) -> JudgedCampaign:
 
 def test_a_load_that_comes_aboard_is_found_in_the_logs_after_it() -> None:
     found = judged(campaign([False, False, False, True, True, True]))
-    assert found.load is not None
-    assert found.load.confirmed
-    assert found.load.change.aboard == (3, 4, 5)
+    assert found.change is not None
+    assert found.change.confirmed
+    assert found.change.change.acting == (3, 4, 5)
     for name, true in (("mass", MASS), ("x", X)):
-        estimate = found.load.difference.estimates[name]
+        estimate = found.change.difference.estimates[name]
         assert estimate.low < true < estimate.high
-    assert found.load.difference.estimates["mass"].value == pytest.approx(MASS, rel=0.25)
-    assert "more than in the 3 logs before" in found.load.says
-    assert found.load.says.endswith("a load came aboard between 2.bag and 3.bag.")
+    assert found.change.difference.estimates["mass"].value == pytest.approx(MASS, rel=0.25)
+    assert "more than in the 3 logs before" in found.change.says
+    assert found.change.says.endswith("a load came aboard between 2.bag and 3.bag.")
     named = [[one.finding.effect for one in found.claims(f"trials/{i}.bag")].count("payload") for i in range(6)]
     assert named == [0, 0, 0, 1, 1, 1]
-    assert found.notes[0] == found.load.says
+    assert found.notes[0] == found.change.says
     # What all logs say together has it aboard where it was.
     masses = [found.hull.fit.force_model(i).load is not None for i in range(6)]
     assert masses == [False, False, False, True, True, True]
@@ -82,19 +83,19 @@ def test_a_load_that_comes_aboard_is_found_in_the_logs_after_it() -> None:
 
 def test_a_load_that_is_put_ashore_is_found_in_the_logs_before_it_whatever_their_order() -> None:
     found = judged(campaign([False, True, False, True, True], order=(1, 4, 3, 0, 2)))
-    assert found.load is not None
-    assert found.load.change.aboard == (1, 4, 3)
-    assert found.load.says.endswith("a load was put ashore between 3.bag and 0.bag.")
-    assert "more than in the 2 logs after" in found.load.says
+    assert found.change is not None
+    assert found.change.change.acting == (1, 4, 3)
+    assert found.change.says.endswith("a load was put ashore between 3.bag and 0.bag.")
+    assert "more than in the 2 logs after" in found.change.says
 
 
 @pytest.mark.parametrize("loaded", [[False] * 6, [True] * 6], ids=["none", "aboard all along"])
 def test_logs_that_are_alike_have_no_change(loaded: list[bool]) -> None:
-    assert judged(campaign(loaded)).load is None
+    assert judged(campaign(loaded)).change is None
 
 
 def test_one_log_that_differs_is_no_change() -> None:
-    assert judged(campaign([False, False, False, False, True])).load is None
+    assert judged(campaign([False, False, False, False, True])).change is None
 
 
 def test_a_load_that_was_measured_is_not_sought() -> None:
@@ -104,12 +105,73 @@ def test_a_load_that_was_measured_is_not_sought() -> None:
     measured = replace(first.windows, measurements=replace(first.windows.measurements, payload=known))
     plain = replace(first.plain, measurements=measured.measurements)
     told = replace(whole, members=(replace(first, windows=measured, plain=plain), *whole.members[1:]))
-    assert judged(told).load is None
+    assert judged(told).change is None
 
 
 def test_no_load_of_all_logs_is_hinted_at_beside_one_of_some_that_it_stood_in_for() -> None:
     found = judged(campaign([False, False, False, True, True, True], known=True))
-    assert found.load is not None
-    assert found.load.confirmed
+    assert found.change is not None
+    assert found.change.confirmed
     named = [[one.finding.effect for one in found.claims(f"trials/{i}.bag")].count("payload") for i in range(6)]
     assert named == [0, 0, 0, 1, 1, 1]
+
+
+NAMES = tuple(one.name for one in FERRY.actuators)
+
+
+def weakening(factors: Sequence[float], names: Sequence[str] = NAMES[:1], known: bool = False) -> JudgedCampaign:
+    """Judge logs in which actuators gave these parts of the force that their thrust curves say."""
+    members = []
+    for number, factor in enumerate(factors):
+        first = 300 * number
+        whole = sailed(240.0 + 0.2 * first, np.zeros(2))
+        rows = slice(first, None)
+        cut = {name: getattr(whole, name)[rows] for name in ("t", "eta", "nu_raw", "nu", "parts", "angles", "usable")}
+        share = (0.5 + 0.4 * np.sin(cut["t"] / 13.0))[:, None]
+        force = cut["parts"].sum(axis=1)
+        parts = np.stack([share * force, (1.0 - share) * force], axis=1)
+        for name in names:
+            # What truly acted is a factor of what the record says.
+            parts[:, NAMES.index(name)] /= factor
+        members.append(member_of(replace(whole, **{**cut, "parts": parts})))
+    return judged(together(members, known=known))
+
+
+@pytest.mark.parametrize("known", [False, True], ids=["no hull model", "hull known"])
+def test_a_thruster_that_weakens_between_logs_is_found_in_the_logs_after_it(known: bool) -> None:
+    found = weakening([1.0, 1.0, 1.0, 0.7, 0.7, 0.7], known=known)
+    assert found.change is not None
+    assert found.change.confirmed
+    assert found.change.change.candidate.key == ("thruster_gain", NAMES[0])
+    assert found.change.change.acting == (3, 4, 5)
+    factor = found.change.difference.estimates["factor"]
+    assert factor.low < 0.7 < factor.high
+    assert factor.value == pytest.approx(0.7, abs=0.03)
+    assert f"{NAMES[0]} gave 70 % of the force that it had in the 3 logs before" in found.change.says
+    assert found.change.says.endswith("it weakened between 2.bag and 3.bag.")
+    named = [[one.finding.effect for one in found.claims(f"trials/{i}.bag") if one.finding.sure] for i in range(6)]
+    assert named == [[], [], [], ["thruster_gain"], ["thruster_gain"], ["thruster_gain"]]
+
+
+def test_a_thruster_that_was_mended_is_found_in_the_logs_before_it() -> None:
+    found = weakening([0.7, 0.7, 1.0, 1.0, 1.0], known=True)
+    assert found.change is not None
+    assert found.change.confirmed
+    assert found.change.change.acting == (0, 1)
+    factor = found.change.difference.estimates["factor"]
+    assert factor.low < 0.7 < factor.high
+    assert found.change.says.endswith("it came back between 1.bag and 2.bag.")
+
+
+def test_actuators_that_all_weaken_alike_are_one_change() -> None:
+    found = weakening([1.0, 1.0, 1.0, 0.8, 0.8, 0.8], NAMES, known=True)
+    assert found.change is not None
+    assert found.change.confirmed
+    assert found.change.change.candidate.key == ("thruster_gain", ALL_THRUSTERS)
+    assert found.change.difference.estimates["factor"].value == pytest.approx(0.8, abs=0.03)
+    assert "Every actuator gave 80 %" in found.change.says
+
+
+@pytest.mark.parametrize("factor", [1.0, 0.7])
+def test_a_thruster_that_is_alike_in_all_logs_is_no_change(factor: float) -> None:
+    assert weakening([factor] * 4, known=True).change is None

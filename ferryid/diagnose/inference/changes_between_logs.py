@@ -1,0 +1,131 @@
+"""What changed between two logs of a campaign: a load came aboard or was put ashore, a thruster weakened or was mended.
+
+What is alike in all logs looks like another hull or curve where nobody has modelled it; what acts in some of them does not.
+Every time between two logs is weighed, by the evidence that a change in the logs before it, or in those after it, would add if
+the gaps were linear in it: sums over the logs. What is likely is then a difference between two groups of logs, estimated and
+weighed against every other difference between them.
+
+References
+----------
+Chen and Gupta (2012), Parametric statistical change point analysis, for one change at an unknown place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import log
+
+import numpy as np
+
+from ferryid.diagnose.inference.campaign_estimation import CampaignFit, estimate_campaign
+from ferryid.diagnose.inference.campaign_model import Campaign
+from ferryid.diagnose.inference.campaign_properties import LOADS
+from ferryid.diagnose.inference.candidate import Candidate
+from ferryid.diagnose.inference.group_differences import (
+    FAULTS,
+    GROUPS,
+    Contender,
+    differences_of,
+    gains_of_ways,
+    in_groups,
+    likeliest_difference,
+)
+from ferryid.diagnose.inference.thresholds import INFERENCE
+
+
+@dataclass(frozen=True)
+class Change:
+    """A load or a fault that acts in the logs before a time, or in those after it, beside everything else.
+
+    Attributes
+    ----------
+    candidate
+        The load or fault, in the logs of its group.
+    fit
+        The estimate with it, its logs in two groups.
+    contenders
+        Other differences that were tried in its place.
+    count
+        How many logs are before the time.
+    """
+
+    candidate: Candidate
+    fit: CampaignFit
+    contenders: tuple[Contender, ...]
+    count: int
+
+    @property
+    def after(self) -> bool:
+        """Whether it acts in the logs after the time."""
+        return self.candidate.group == GROUPS[1]
+
+    @property
+    def acting(self) -> tuple[int, ...]:
+        """The places in the campaign of the logs in which it acts, in order of time."""
+        order = self.fit.campaign.order
+        return order[self.count :] if self.after else order[: self.count]
+
+    @property
+    def others(self) -> tuple[int, ...]:
+        """Those of the other logs."""
+        order = self.fit.campaign.order
+        return order[: self.count] if self.after else order[self.count :]
+
+
+def find_change(made: CampaignFit) -> Change | None:
+    """Return a load or a fault that came or went between two logs; None where the evidence favours none.
+
+    Parameters
+    ----------
+    made
+        What the logs say together, without such a change.
+    """
+    order = made.campaign.order
+    if len(order) < 2 * INFERENCE.change_logs:
+        return None
+    # What is compared has settled under one noise.
+    made = estimate_campaign(made.campaign, noise=made.noise, begin=made)
+    weighed = [one for candidate in _changes(made, order) for one in _weighed(made, candidate, order)]
+    evidence, count, candidate = max(weighed, key=lambda one: one[0], default=(0.0, 0, None))
+    if candidate is None or evidence < INFERENCE.prior_odds:
+        return None
+    grouped = replace(made, campaign=_parted(made.campaign, order, count))
+    rarity = {one.key: one.log_alternatives for _, _, one in weighed}
+    differences = [
+        replace(one, log_alternatives=rarity.get(one.key, one.log_alternatives))
+        for one in differences_of(grouped.campaign)
+    ]
+    found = likeliest_difference(grouped, differences)
+    if found is None or not _may_change(found.comparison.candidate):
+        return None
+    return Change(found.comparison.candidate, found.fit, found.contenders, count)
+
+
+def _may_change(one: Candidate) -> bool:
+    """Return whether an effect comes and goes between logs: another difference between them is one of circumstances."""
+    return one.effect.id in LOADS | FAULTS
+
+
+def _parted(campaign: Campaign, order: Sequence[int], count: int) -> Campaign:
+    """Return the logs in two groups, those before a time and those after it."""
+    before = set(order[:count])
+    return in_groups(campaign, [GROUPS[0] if i in before else GROUPS[1] for i in range(len(order))])
+
+
+def _changes(made: CampaignFit, order: Sequence[int]) -> list[Candidate]:
+    """Return the loads and faults that the logs can show, in either group, as rare as one of all changes that are weighed."""
+    ways = log(2.0 * (len(order) + 1 - 2 * INFERENCE.change_logs))
+    differences = differences_of(_parted(made.campaign, order, INFERENCE.change_logs))
+    return [replace(one, log_alternatives=one.log_alternatives + ways) for one in differences if _may_change(one)]
+
+
+def _weighed(made: CampaignFit, change: Candidate, order: Sequence[int]) -> list[tuple[float, int, Candidate]]:
+    """Return the evidence that a change adds, for every number of logs before it."""
+    counts, after = range(INFERENCE.change_logs, len(order) - INFERENCE.change_logs + 1), change.group == GROUPS[1]
+    ways = []
+    for count in counts:
+        acts = np.zeros(len(order), dtype=np.bool_)
+        acts[list(order[count:] if after else order[:count])] = True
+        ways.append(acts)
+    return [(gain, count, change) for gain, count in zip(gains_of_ways(made, change, ways), counts, strict=True)]
