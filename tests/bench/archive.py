@@ -42,7 +42,7 @@ ROWS_A_LOG = 144_000
 HELP_GOAL_S = 0.08
 BATCH_LOGS, BATCH_GOAL_S = 20, 180.0
 """Logs of a batch and the goal of all [s]."""
-MEASURED_LOGS = 6
+MEASURED_LOGS = 4
 """So many of them are measured, against their part of the goal: a smaller batch has the same start."""
 RIVAL_LOGS = 4
 """Logs of the batch that the rival reads; its time is multiplied."""
