@@ -47,9 +47,9 @@ def main() -> int:
             if name == "ingest":
                 run = partial(run, folder=options.folder)
             start, made_before_s = time.perf_counter(), preparing.spent_s()
-            # A quick run has time for one measurement of the yardstick; a whole one measures it before every other part, and at
-            # the end: machines change their speed within minutes, not within one part.
-            wanted = not sections or (not options.quick and len(sections) % 2 == 0)
+            # A quick run has time for one measurement of the yardstick; a whole one measures it before every third part and at
+            # the end: over a run it differed by less than a tenth.
+            wanted = not sections or (not options.quick and len(sections) % 3 == 0)
             before = [yardstick.measured(options.folder)] if wanted else []
             section = run(options.quick)
             after = [yardstick.measured(options.folder)] if whole and name == MODULES[-1] else []

@@ -94,7 +94,7 @@ def run(quick: bool) -> Section:
         "The pass over the rows forms basis and cross-products in chunks from arrays in memory, once; ingestion and smoothing, "
         "which the sums save as well, are not counted.",
     ]
-    start_up, same = _start_up(3 if quick else 15)
+    start_up, same = _start_up(3 if quick else 9)
     with tempfile.TemporaryDirectory() as folder:
         rows = [*table, *_batch(1 if quick else MEASURED_LOGS, Path(folder)), *start_up]
     return Section(

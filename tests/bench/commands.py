@@ -30,7 +30,10 @@ FIT_STEPS = {
     "wind and gusts of each log": ("/identify/weak_data.py:conditions",),
     "components, and which estimator": ("/identify/pipeline.py:_choose_data",),
     "estimates and bootstrap": ("/identify/estimation.py:estimate_correction",),
-    "runs of the model without the measured motion": ("/identify/windowed_data.py:free_runs", "/fit_data.py:free_runs"),
+    "runs of the model without the measured motion": (
+        "/identify/motion_data.py:free_runs",
+        "/windowed_data.py:free_runs",
+    ),
     "judging": ("/identify/pipeline.py:accept_estimate",),
     "storing the model": ("/models/store/versions.py:save",),
     "page and figures": ("/report/fit_report.py:_write_page",),

@@ -59,7 +59,8 @@ def begin(steps: Mapping[str, Sequence[str]], interval_s: float) -> Callable[[],
         found, function = REST, ""
         while frame is not None:
             code = frame.f_code
-            if not function and own in code.co_filename:
+            # A compiled loop is a part of what calls it.
+            if not function and own in code.co_filename and not code.co_filename.endswith("compiled.py"):
                 function = f"{os.path.basename(code.co_filename)}:{code.co_name}"
             if step(code):
                 found = step(code)
