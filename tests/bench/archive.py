@@ -32,6 +32,7 @@ from ferryid.simulate import load_scenario, simulate, write_log
 from ferryid.vessel import load_profile
 from tests.bench.identify import of_motion
 from tests.bench.page import Row, Section, Timed, faster_row, in_turn
+from tests.bench.preparing import preparing
 from tests.bench.processes import whole_process
 from tests.bench.rivals import rosbags_to_parquet
 from tests.bench.trials import ROUND_S, SCALE, VESSEL, written
@@ -41,7 +42,7 @@ ROWS_A_LOG = 144_000
 HELP_GOAL_S = 0.08
 BATCH_LOGS, BATCH_GOAL_S = 20, 180.0
 """Logs of a batch and the goal of all [s]."""
-MEASURED_LOGS = 10
+MEASURED_LOGS = 4
 """So many of them are measured, against their part of the goal: a smaller batch has the same start."""
 RIVAL_LOGS = 4
 """Logs of the batch that the rival reads; its time is multiplied."""
@@ -57,7 +58,8 @@ def run(quick: bool) -> Section:
     rows = logs * ROWS_A_LOG
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)
-        season(out, logs)
+        with preparing():
+            season(out, logs)
         size, windows = (
             sum(path.stat().st_size for path in out.glob(f"logs/*/{kind}-*.parquet")) for kind in ("pieces", "windows")
         )
@@ -92,7 +94,7 @@ def run(quick: bool) -> Section:
         "The pass over the rows forms basis and cross-products in chunks from arrays in memory, once; ingestion and smoothing, "
         "which the sums save as well, are not counted.",
     ]
-    start_up, same = _start_up(3 if quick else 15)
+    start_up, same = _start_up(3 if quick else 9)
     with tempfile.TemporaryDirectory() as folder:
         rows = [*table, *_batch(1 if quick else MEASURED_LOGS, Path(folder)), *start_up]
     return Section(
@@ -106,7 +108,7 @@ def run(quick: bool) -> Section:
 
 def _batch(logs: int, folder: Path) -> list[Row | Timed]:
     """Return how long a batch of simulated logs takes, ingestion, fit, diagnosis and pages of each, whole process."""
-    paths = [written(folder, number, ROUND_S) for number in range(logs)]
+    paths = written(range(logs), ROUND_S)
     recipe = folder / "recipe.toml"
     recipe.write_text('steps = ["fit", "diagnose"]\n', encoding="utf-8")
     words = (

@@ -6,8 +6,9 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
+from tests.bench.diagnosis import STEPS
 from tests.bench.page import Row, Section, Timed, duration
-from tests.bench.processes import whole_process
+from tests.bench.processes import Sampled, sampled_process
 from tests.bench.trials import VESSEL, written
 
 LARGEST_GB = 2.0
@@ -28,31 +29,35 @@ def run(quick: bool) -> Section:
     logs, log_s, bags, more = (2, 120, 4, 3) if quick else (LOGS, LOG_S, BAGS, MORE)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        long = [written(folder, 1 + k, log_s) for k in range(more)]
-        short = [written(folder, 200 + k, BAG_S) for k in range(bags)]
-        some = _diagnosed(long[:logs], folder / "logs")
-        every = _diagnosed(long, folder / "more")
+        long, short = written(range(1, 1 + more), log_s), written(range(200, 200 + bags), BAG_S)
         of = f"{log_s / 60:.2g} min"
+        some, parted, every = (
+            _diagnosed(paths, folder / out) for paths, out in ((long[:logs], "logs"), (short, "bags"), (long, "more"))
+        )
+        timed = (
+            (f"campaign of {logs} logs of {of}", some, LOGS_GOAL_S),
+            (f"campaign of {bags} bags of {BAG_S} s", parted, BAGS_GOAL_S),
+        )
         rows: list[Row | Timed] = [
-            _timed(f"campaign of {logs} logs of {of}", some, LOGS_GOAL_S),
-            _timed(f"campaign of {bags} bags of {BAG_S} s", _diagnosed(short, folder / "bags"), BAGS_GOAL_S),
+            *(_timed(what, (run.took_s, run.peak), goal_s) for what, run, goal_s in timed),
             _memory(
                 f"campaign of {SEASON} logs of {of}, memory by {logs} and {more} logs",
-                grown(some[1], every[1], logs, more),
-                f", {every[1] / 1e9:.2f} GB and {duration(every[0])} of {more}",
+                grown(some.peak, every.peak, logs, more),
+                f", {every.peak / 1e9:.2f} GB and {duration(every.took_s)} of {more}",
             ),
         ]
     notes = [
         f"`diagnose LOG...` of all together, whole processes, from the recorded logs to the report; {LARGEST_GB:g} GB of "
         "memory are allowed in every row. Every log has a wind of its own and noise of its own.",
         "The fits of the model to all rows are made one after another here, as with a hundred logs, and not side by side.",
+        *(run.where(what) for what, run, _ in timed),
     ]
     return Section("Campaigns", rows, notes)
 
 
-def _diagnosed(paths: Sequence[Path], out: Path) -> tuple[float, int]:
-    """Return time [s] and peak memory [bytes] of a diagnosis into a folder that is empty."""
-    return whole_process(("diagnose", *map(str, paths), *VESSEL, "--out", str(out)), before=IN_TURN)
+def _diagnosed(paths: Sequence[Path], out: Path) -> Sampled:
+    """Return a diagnosis into a folder that is empty, measured."""
+    return sampled_process(("diagnose", *map(str, paths), *VESSEL, "--out", str(out)), STEPS, before=IN_TURN)
 
 
 def _timed(what: str, measured: tuple[float, int], goal_s: float) -> Timed:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import os
 import pickle
+import shutil
 import statistics
 import tempfile
 import time
@@ -23,17 +24,18 @@ from ferryid import api
 from ferryid.batch import spread
 from tests.bench.archive import FIT, ROWS_A_LOG, season
 from tests.bench.page import Curve, Row, Section, Timed, duration
+from tests.bench.preparing import preparing
 from tests.bench.processes import whole_process
 from tests.bench.trials import ROUND_S, SCALE, VESSEL, written
 
 WORKERS = (1, 2, 4, 8)
-LOGS = 6
+LOGS = 4
 QUICK_S = 180
 """Length of the shorter logs of a quick run [s]."""
 LONG_S = 3600
 """Length of the longer logs [s], by which the time of a log is split into what its rows take and what it takes without."""
 CASES = ("--only", "short", "--runs", "0.5", "--seed", "20261128")
-TRIVIAL = 500
+TRIVIAL = 200
 PROJECTED_LOGS, PROJECTED_ROWS = 10_000, 10_000_000_000
 RATE_HZ = 20.0
 RECIPE = 'steps = ["fit"]\n[fit]\ndelta = 0.4\nsigma = 0.4\n'
@@ -81,7 +83,7 @@ def run(quick: bool) -> Section:
     found = Measured()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        paths = [written(folder, number, short_s) for number in range(logs)]
+        paths = written(range(logs), short_s)
         recipe = folder / "recipe.toml"
         recipe.write_text(RECIPE, encoding="utf-8")
 
@@ -101,14 +103,14 @@ def run(quick: bool) -> Section:
                     few = max(logs // 2, 2)
                     some = [batch(paths[:number], f"some{number}", address) for number in (1, few)]
                     short_log_s = (some[1] - some[0]) / (few - 1)
-                    longer = [written(folder, 200 + number, long_s) for number in range(2)]
+                    longer = written([200, 201], long_s)
                     # The process itself, and what its first log takes beyond that, are known by the shorter ones.
                     long_log_s = (batch(longer, "long", address) - (some[0] - short_log_s)) / len(longer)
                     moved = _traffic(paths[:2], recipe, folder / "moved", address)
         archive_s = whole_process(("fit", "--archive", *VESSEL, *SCALE, "--out", str(folder / f"batch{workers[-1]}")))[
             0
         ]
-        kept = _archive(folder, (10, 110) if quick else (50, 550), 1 if quick else 5)
+        kept = _archive(folder, (10, 110) if quick else (50, 550), 1 if quick else 3)
     rows = [
         row
         for what, times in (
@@ -219,9 +221,13 @@ def _archive(folder: Path, counts: tuple[int, int], repeats: int) -> Archive:
     They are so far apart that what the larger one takes more is far above how much runs differ.
     """
     outs = [folder / f"season{count}" for count in counts]
-    for out, count in zip(outs, counts, strict=True):
-        out.mkdir()
-        season(out, count, weak=False)
+    with preparing():
+        for out in outs:
+            out.mkdir()
+        season(outs[1], counts[1], weak=False)
+        # The smaller archive is a part of the larger one.
+        for log in sorted((outs[1] / "logs").iterdir())[: counts[0]]:
+            shutil.copytree(log, outs[0] / "logs" / log.name)
     few_kept, many_kept = (sum(path.stat().st_size for path in out.glob("logs/*/*")) for out in outs)
     few, many = zip(*([whole_process((*FIT, "--out", str(out))) for out in outs] for _ in range(repeats)), strict=True)
     return added(counts, few, many, many_kept - few_kept)

@@ -13,7 +13,7 @@ from ferryid.batch.kept import key_of, read_row, write_row
 from ferryid.batch.log_result import LogFile
 from ferryid.simulate import load_scenario, simulate, write_log
 from tests.bench.page import Row, Section, Timed, faster_row
-from tests.bench.processes import floor, where, whole_process
+from tests.bench.processes import SHORT_INTERVAL_S, floor, sampled_process, whole_process
 from tests.bench.trials import SCALE, VESSEL
 
 TABLES = ("numpy", "pyarrow", "pyarrow.parquet", "typer")
@@ -22,13 +22,33 @@ STATISTICS = ("scipy.linalg", "scipy.special")
 """What a fit needs besides: banded equations, and quantiles of its intervals."""
 COMPILED = ("numpy", "numba", "typer")
 """What a simulation needs."""
-STAGES = {
-    "reading": ":read_logs",
-    "forces that act the wrong way": ":refuse_reversed_forces",
-    "length of the windows": ":best_length",
-    "wind and gusts of each log": "/identify/weak_data.py:conditions",
-    "runs of the model without the measured motion": ":free_runs",
+FIT_STEPS = {
+    "reading and putting on one grid": ("/identify/inputs.py:read_logs",),
+    "smoothing and residuals": ("/identify/pipeline.py:_prepare",),
+    "forces that act the wrong way": ("/identify/force_signs.py:refuse_reversed_forces",),
+    "length of the windows": ("/identify/window_length.py:with_best_length",),
+    "wind and gusts of each log": ("/identify/weak_data.py:conditions",),
+    "components, and which estimator": ("/identify/pipeline.py:_choose_data",),
+    "estimates and bootstrap": ("/identify/estimation.py:estimate_correction",),
+    "runs of the model without the measured motion": (
+        "/identify/motion_data.py:free_runs",
+        "/windowed_data.py:free_runs",
+    ),
+    "judging": ("/identify/pipeline.py:accept_estimate",),
+    "storing the model": ("/models/store/versions.py:save",),
+    "page and figures": ("/report/fit_report.py:_write_page",),
 }
+SIMULATION_STEPS = {
+    "simulating": ("/simulate/trial.py:simulate",),
+    "writing the log": ("/simulate/logs.py:write_log",),
+}
+BATCH_STEPS = {
+    "finding the logs": ("/batch/logs.py:entries_of",),
+    "comparing with what is kept": ("/batch/kept.py:__init__", "/batch/kept.py:of", "/batch/run.py:_task"),
+    "summing up": ("/batch/run.py:_summed_up", "/batch/run.py:_changes"),
+    "page and figures": ("/report/batch_page.py:render", "/report/batch_page.py:timelines"),
+}
+"""Functions of the steps of a fit, a simulation and a batch."""
 ROUND = """
 schema = "ferryid.scenario/1"
 title = "One round of the 12-corner path"
@@ -58,20 +78,28 @@ def run(quick: bool) -> Section:
         ]
         resume = _resumable(folder / "batch", logs)
         rows.append(_row(f"ferryid batch, {logs} logs and nothing to do", _times([resume] * repeats), 5.0))
-        fits = [("fit", str(trial), *VESSEL, *SCALE, "--out", str(folder / f"floor{number}")) for number in range(6)]
-        simulation = ("simulate", str(scenario), *log)
-        of_fit, bare, simulated, resumed = (row.took_s for row in rows if isinstance(row, Timed))
-        floors = [
-            floor("`fit` of 24 min", of_fit, fits[0], fits[1], (*TABLES, *STATISTICS, "matplotlib.figure")),
-            floor(
-                "`fit --no-report`", bare, (*fits[2], "--no-report"), (*fits[3], "--no-report"), (*TABLES, *STATISTICS)
-            ),
-            *where(STAGES, (*fits[4], "--no-report"), {"`fit --no-report`": (*fits[5], "--no-report")}),
-            floor("`simulate` of 12 min", simulated, simulation, simulation, COMPILED),
-            floor(f"`batch` of {logs} logs and nothing to do", resumed, resume, resume, ("numpy", "typer")),
+        fit = ("fit", str(trial), *VESSEL, *SCALE)
+        where = [
+            floor(what, sampled_process(words, steps, interval_s=SHORT_INTERVAL_S), packages)
+            for what, words, steps, packages in (
+                (
+                    "`fit` of 24 min",
+                    (*fit, "--out", str(folder / "page")),
+                    FIT_STEPS,
+                    (*TABLES, *STATISTICS, "matplotlib.figure"),
+                ),
+                (
+                    "`fit --no-report`",
+                    (*fit, "--no-report", "--out", str(folder / "bare")),
+                    FIT_STEPS,
+                    (*TABLES, *STATISTICS),
+                ),
+                ("`simulate` of 12 min", ("simulate", str(scenario), *log), SIMULATION_STEPS, COMPILED),
+                (f"`batch` of {logs} logs and nothing to do", resume, BATCH_STEPS, ("numpy", "typer")),
+            )
         ]
     notes = (
-        *floors,
+        *where,
         "The log of a fit is read each time; what numba compiles is kept from the first run. The logs of the batch are links "
         "to one file, whose result is kept for each of them under its own name and hash.",
     )

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import statistics
 import tempfile
-from collections.abc import Mapping
-from math import nan
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +10,7 @@ import numpy as np
 from ferryid.signals.recording import record
 from ferryid.vessel import load_profile
 from tests.bench.page import Curve, Row, Section, Timed, duration
-from tests.bench.processes import floor, where, whole_process
+from tests.bench.processes import Sampled, floor, middle, sampled_process
 from tests.bench.trials import VESSEL, written
 
 LENGTHS_S = {720: 5.0, 1440: 8.0, 3600: 45.0, 7200: 90.0}
@@ -24,17 +21,31 @@ LOGS = {2: None, 5: None, 14: 20.0}
 """Logs of seven minutes in a campaign, and the goal of as many [s]."""
 LINEAR = 1.1
 """Most power of the length, and of the number of logs, with which the time may grow."""
-STAGES = {
-    "reading and sensor checks": "/diagnose/:gather",
-    "several logs together": "/diagnose/:judge_campaign",
-    "selecting effects": "/diagnose/:select",
-    "judging": "/diagnose/:judge",
-    "of that the interval of an onset or end": "/judging/findings.py:_time",
-    "learning what is left": "/diagnose/:learn",
-    "page and figures": "/report/diagnosis_report.py:report",
+STEPS = {
+    "reading": ("/data/measurements.py:measure_log",),
+    "screening of the sensors": ("/checks/screening.py:screen_sensors", "/diagnose/gathering.py:with_common_sensors"),
+    "averages over windows": ("/inference/stages.py:average",),
+    "comparing the hulls of logs": ("/diagnose/gathering.py:part",),
+    "estimating one hull of all logs": ("/judging/campaign.py:judge_campaign",),
+    "conditions of single logs": ("/judging/campaign_conditions.py:judge_conditions",),
+    "placebos of conditions": (
+        "/judging/campaign_conditions.py:_against_placebos",
+        "/judging/campaign_conditions.py:_against_others",
+    ),
+    "held-out blocks": ("/judging/campaign_evidence.py:held_out_loss",),
+    "properties of all logs": ("/judging/campaign_properties.py:judge_properties",),
+    "changes of load between logs": ("/judging/load_changes.py:judge_load_change",),
+    "estimating and selecting effects of each log": ("/inference/stages.py:estimate", "/inference/stages.py:select"),
+    "judging effects of each log": ("/judging/judge.py:judge",),
+    "the interval of an onset or end": ("/judging/findings.py:_time",),
+    "conclusions": ("/judging/conclude.py:conclude",),
+    "other instruments": ("/second_sources/sources.py:compare_second_sources",),
+    "learning what is left": ("/judging/model_update.py:store_updated_model",),
+    "page and figures": ("/report/diagnosis_report.py:report", "/report/page_process.py:drawings"),
 }
-PROFILED_S = (720, 1440)
-"""Lengths of the logs whose diagnosis is profiled [s]."""
+"""Functions of the steps of a diagnosis."""
+PACKAGES = ("numpy", "numba", "scipy.optimize", "scipy.signal", "pyarrow.parquet", "matplotlib.figure", "typer")
+"""What any program for a diagnosis would import."""
 
 
 def run(quick: bool) -> Section:
@@ -43,10 +54,10 @@ def run(quick: bool) -> Section:
     logs = {} if quick else LOGS
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        single = {seconds: [written(folder, 0, seconds)] for seconds in lengths}
+        single = {seconds: written([0], seconds) for seconds in lengths}
         part_s = 200 if quick else 420
-        together = {count: [written(folder, 1 + k, part_s) for k in range(count)] for count in logs}
-        rows, curves, shortest_s = list[Row | Timed](), list[Curve](), nan
+        together = {count: written(range(1, 1 + count), part_s) for count in logs}
+        rows, curves, where = list[Row | Timed](), list[Curve](), list[str]()
         for title, against, kind, goals in (
             ("diagnose, {:.0f} min", "length [min]", single, lengths),
             (f"campaign of {{:.0f}} logs of {part_s / 60:.2g} min", "number of logs", together, logs),
@@ -54,12 +65,14 @@ def run(quick: bool) -> Section:
             times: dict[float, float] = {}
             for number, paths in kind.items():
                 repeats = REPEATS if kind is single and number <= REPEATED_S and not quick else 1
-                took, much = _measured(paths, folder, repeats)
+                measured = _measured(paths, folder, repeats)
                 size = number / 60 if kind is single else number
+                what, took, much = title.format(size), measured.took_s, measured.peak
                 times[size] = took
-                rows.append(_row(title.format(size), took, much, goals[number], next(iter(times.values()))))
-            if kind is single:
-                shortest_s = times[min(times)]
+                rows.append(_row(what, took, much, goals[number], next(iter(times.values()))))
+                if goals[number] is not None or quick:
+                    shortest = kind is single and len(times) == 1
+                    where.append(floor(what, measured, PACKAGES) if shortest else measured.where(what))
             if len(times) > 1:
                 curves.append(
                     Curve(f"diagnose, {'one log' if kind is single else 'campaign'}", against, list(times.items()))
@@ -68,28 +81,18 @@ def run(quick: bool) -> Section:
             "Whole processes, report included, on tables that were ingested before; logs of up to "
             f"{REPEATED_S / 60:.0f} min {REPEATS} times, of which the median counts.",
             *(_growth(curve) for curve in curves),
-            floor(
-                f"`diagnose` of {min(single) / 60:.0f} min",
-                shortest_s,
-                *(
-                    ("diagnose", str(*single[min(single)]), *VESSEL, "--out", str(folder / out))
-                    for out in ("out", "out")
-                ),
-                ("numpy", "numba", "scipy.optimize", "scipy.signal", "pyarrow.parquet", "matplotlib.figure", "typer"),
-            ),
-            *_where(folder, {seconds: paths for seconds, paths in single.items() if quick or seconds in PROFILED_S}),
+            *where,
         ]
     return Section("Diagnosis", rows, notes, curves=curves)
 
 
-def _measured(paths: list[Path], folder: Path, repeats: int) -> tuple[float, int]:
-    """Return the median time [s] and the most memory [bytes] of diagnoses; the logs were ingested before."""
+def _measured(paths: list[Path], folder: Path, repeats: int) -> Sampled:
+    """Return the middle one of diagnoses by their time, with the most memory of all; the logs were ingested before."""
     more = (*VESSEL, "--out", str(folder / "out"))
     for path in paths:
         record(path, load_profile("milliampere"), folder / "out")
     command = ("diagnose", *map(str, paths), *more)
-    took, much = zip(*(whole_process(command) for _ in range(repeats)), strict=True)
-    return statistics.median(took), max(much)
+    return middle([sampled_process(command, STEPS) for _ in range(repeats)])
 
 
 def _row(what: str, took: float, much: int, goal_s: float | None, smallest_s: float) -> Row | Timed:
@@ -106,12 +109,3 @@ def _growth(curve: Curve) -> str:
     points = ", ".join(duration(took) for _, took in curve.points)
     word = "within" if power <= LINEAR else "**beyond**"
     return f"Time of {curve.what} grows with the {what} to the power of {power:.2f} ({points}), {word} {LINEAR:g}."
-
-
-def _where(folder: Path, logs: Mapping[int, list[Path]]) -> list[str]:
-    """Return where the time of diagnoses goes, of logs by their length [s]."""
-    words = {
-        f"a log of {seconds / 60:.0f} min": ("diagnose", *map(str, paths), *VESSEL, "--out", str(folder / "profiled"))
-        for seconds, paths in logs.items()
-    }
-    return where(STAGES, next(iter(words.values())), words)

@@ -51,7 +51,11 @@ def run(quick: bool) -> Section:
     many = 1_000_000 if quick else 100_000_000
     repeats = 3 if quick else 5
     same: dict[str, float] = {}
-    rows = [*fits(large, repeats, same), *sweeps(small, repeats), *bootstraps(small, repeats)]
+    arrays = regression(large)
+    rows = list(fits(arrays, repeats, same))
+    extra = extra_memory(arrays)
+    del arrays
+    rows += [*sweeps(small, repeats), *bootstraps(small, repeats)]
     row, floor = fused(many, 3)
     rows.append(row)
     notes = [
@@ -64,15 +68,16 @@ def run(quick: bool) -> Section:
         "differ in cross-validation alone. scikit-learn's grid search refits for every number of components; one fold of "
         f"one window of it is timed and counted {len(WINDOWS_S) * FOLDS} times.",
         floor,
-        f"Fit of {large:,} rows: {extra_memory(large) / 1e6:.1f} MB beside the data.",
+        f"Fit of {large:,} rows: {extra / 1e6:.1f} MB beside the data.",
         *digits(),
     ]
     return Section("Fit, sweep, bootstrap", rows, notes, ("numpy", "scikit-learn", "ikpls"), same={} if quick else same)
 
 
-def fits(n: int, repeats: int, same: dict[str, float]) -> Iterator[Row]:
+def fits(arrays: tuple[Floats, Floats], repeats: int, same: dict[str, float]) -> Iterator[Row]:
     """Yield the rows of fits, and add what the rivals took to `same` [s]."""
-    X, Y = regression(n)
+    X, Y = arrays
+    n = len(X)
     part = n // SHARE
 
     def ours() -> None:
@@ -343,8 +348,8 @@ def one_fold_refitted(X: Floats, Y: Floats) -> None:
         np.mean((Y[~train] - fit.predict(X[~train])) ** 2, axis=0)
 
 
-def extra_memory(n: int) -> int:
-    X, Y = regression(n)
+def extra_memory(arrays: tuple[Floats, Floats]) -> int:
+    X, Y = arrays
     tracemalloc.start()
     fit_simpls(from_rows(CrossProducts, X, Y), COMPONENTS)
     peak = tracemalloc.get_traced_memory()[1]

@@ -40,7 +40,8 @@ from ferryid.signals.recording import log_name, read_recording, record
 from ferryid.vessel import load_profile
 from tests.bench import logs, rivals
 from tests.bench.page import Row, Section, duration, faster, faster_row, in_turn, within_row
-from tests.bench.processes import floor
+from tests.bench.preparing import preparing
+from tests.bench.processes import SHORT_INTERVAL_S, floor, middle, sampled_process
 
 PROFILE = Path(__file__).with_name("bench.toml")
 FORMATS = {"mcap": ("zstd", "lz4", "none"), "bag": ("lz4", "none"), "db3": ("none",)}
@@ -133,14 +134,22 @@ def parquet_of(log: Path) -> Callable[[], None]:
     return work
 
 
-def against_rosbags(folder: Path, short: float, long: float) -> list[Row]:
-    """Log → Parquet, without the content hash, which the rival does not make, and with it.
+def read_and_write(folder: Path, short: float, long: float) -> tuple[list[Row], list[str], float]:
+    """Log → Parquet against rosbags and against the least work conceivable, all of one format in the same rounds.
 
-    The rival is timed on the short log of the same format in the same rounds, as a machine changes its speed within a run, once
-    a round: nearly all that it takes is deserialising, whatever the compression, and grows with the number of messages.
+    With rosbags it is compared without the content hash, which the rival does not make, and with it. The rival is timed on the
+    short log of the same format, as a machine changes its speed within a run, once a round: nearly all that it takes is
+    deserialising, whatever the compression, and grows with the number of messages. The least work is to decompress everything
+    and to write the same tables.
+
+    Returns
+    -------
+    tuple
+        The rows, where the time between goes, and what decompressing the long MCAP log in zstd takes [s].
     """
     lengths = tuple(dict.fromkeys((short, long)))
     rows: dict[tuple[float, str, str], list[Row]] = {}
+    least, notes, zstd_s = [], [], math.nan
     for kind, compressions in FORMATS.items():
         measured = [(minutes, compression) for minutes in lengths for compression in compressions]
         works: list[Callable[[], object]] = [partial(by_rosbags, logs.log(folder, kind, compressions[-1], short))]
@@ -148,7 +157,11 @@ def against_rosbags(folder: Path, short: float, long: float) -> list[Row]:
             log = logs.log(folder, kind, compression, minutes)
             columns(log)
             works += [partial(columns_to_parquet, log), partial(ingest, log)]
-        of_short, *ours = in_turn(works, 3)
+        for compression in compressions:
+            log = logs.log(folder, kind, compression, long)
+            works += [every_row(log) if kind == "db3" else decompress(log), parquet_of(log)]
+        of_short, *others = in_turn(works, 3)
+        ours, parts = others[: 2 * len(measured)], others[2 * len(measured) :]
         for (minutes, compression), bare, whole in zip(measured, ours[::2], ours[1::2], strict=True):
             goal = None if minutes < 120 else 15.0 if kind == "db3" else 35.0
             what = f"{minutes:g} min {NAMES[kind]} {compression}: log → Parquet"
@@ -157,38 +170,31 @@ def against_rosbags(folder: Path, short: float, long: float) -> list[Row]:
                 faster_row(what, bare, ROSBAGS, theirs, goal),
                 faster_row(f"{what}, with content hash", whole, ROSBAGS, theirs, None),
             ]
-    return [row for minutes in lengths for kind, compression in PLAIN for row in rows[minutes, kind, compression]]
-
-
-def against_least_work(folder: Path, minutes: float) -> tuple[list[Row], list[str], float]:
-    """Read and write, against decompressing everything and writing the same tables.
-
-    Returns
-    -------
-    tuple
-        The rows, where the time between goes, and what decompressing the MCAP log in zstd takes [s].
-    """
-    rows, notes, zstd_s = [], [], math.nan
-    for kind, compression in PLAIN:
-        log = logs.log(folder, kind, compression, minutes)
-        name = f"{minutes:g} min {NAMES[kind]} {compression}"
-        reading, told, goal = (
-            (every_row(log), "fetch all rows by sqlite3", None)
-            if kind == "db3"
-            else (decompress(log), "decompress all", 1.5 if compression == "zstd" else 2.0)
-        )
-        ours, unpacked, written = in_turn((partial(columns_to_parquet, log), reading, parquet_of(log)), 3)
-        unpacked_s, written_s = map(statistics.median, (unpacked, written))
-        if (kind, compression) == PLAIN[0]:
-            zstd_s = unpacked_s
-        least = [a + b for a, b in zip(unpacked, written, strict=True)]
-        row = within_row(f"{name}: read + write", ours, f"{told} + write the same Parquet", least, goal)
-        rows.append(row)
-        notes.append(
-            f"{name}: to {told} takes {duration(unpacked_s)} and writing {duration(written_s)}; of the {row.ours} of both and "
-            f"what is between, {between(partial(columns_to_parquet, log))}."
-        )
-    return rows, notes, zstd_s
+        of_long = dict(zip(measured, ours[::2], strict=True))
+        rosbags_s = statistics.median(of_short) * long / short
+        for compression, unpacked, written in zip(compressions, parts[::2], parts[1::2], strict=True):
+            unpacked_s, written_s = map(statistics.median, (unpacked, written))
+            if (kind, compression) == PLAIN[0]:
+                zstd_s = unpacked_s
+            name = f"{long:g} min {NAMES[kind]} {compression}"
+            told, goal = (
+                ("fetch all rows by sqlite3", None)
+                if kind == "db3"
+                else ("decompress all", 1.5 if compression == "zstd" else 2.0)
+            )
+            both = [a + b for a, b in zip(unpacked, written, strict=True)]
+            row = within_row(
+                f"{name}: read + write", of_long[long, compression], f"{told} + write the same Parquet", both, goal
+            )
+            least.append(row)
+            work = partial(columns_to_parquet, logs.log(folder, kind, compression, long))
+            notes.append(
+                f"{name}: to {told} takes {duration(unpacked_s)} and writing {duration(written_s)}, one after the other "
+                f"{rosbags_s / (unpacked_s + written_s):.3g} times as fast as rosbags; of the {row.ours} of both and what is "
+                f"between, {between(work)}."
+            )
+    plain = [row for minutes in lengths for kind, compression in PLAIN for row in rows[minutes, kind, compression]]
+    return [*plain, *least], notes, zstd_s
 
 
 def every_row(log: Path) -> Callable[[], None]:
@@ -290,6 +296,18 @@ def against_rerun(folder: Path, minutes: float) -> tuple[list[Row], list[str]]:
     return [row], [f"{what}: {between(partial(columns, log))}."]
 
 
+PACKAGES = ("numpy", "pyarrow", "pyarrow.parquet", "typer")
+"""What any program that reads a log and writes Parquet would import."""
+PROCESS_STEPS = {
+    "looking for kept tables, and waiting for the content hash": ("/signals/recording.py:_whole",),
+    "opening, summary and index": ("/ingest/__init__.py:open_log",),
+    "finding the signals": ("/signals/recording.py:selected",),
+    "reading": ("/ferryid/ingest/:read",),
+    "clocks": ("/ingest/clocks.py:repair_all",),
+    "units and frames": ("/signals/recording.py:make_recording",),
+    "writing": ("/signals/cache.py:store",),
+}
+"""Functions of the steps of a whole process."""
 OURS = "from ferryid.cli.main import main; main()"
 THEIRS = "from tests.bench.rivals import main; main()"
 SMALL_MCAP = "from tests.bench.rivals import main_small_mcap as main; main()"
@@ -340,11 +358,13 @@ def as_process(folder: Path, minutes: float, repeats: int) -> tuple[list[Row], l
         works: list[Callable[[], object]] = [partial(process, log)]
         works += [partial(rival_process, log, code=code) for _, code, _ in others]
         ours, *theirs = in_turn(works, repeats)
-        with scratch() as first, scratch() as second:
-            words = [("ingest", str(log), "--vessel", str(PROFILE), "--out", str(out)) for out in (first, second)]
-            packages = ("numpy", "pyarrow", "pyarrow.parquet", "typer")
-            told = f"`ingest` of {minutes:g} min {NAMES[kind]} {compression}"
-            notes.append(floor(told, statistics.median(ours), *words, packages))
+        runs = []
+        for _ in range(repeats):
+            with scratch() as out:
+                words = ("ingest", str(log), "--vessel", str(PROFILE), "--out", str(out))
+                runs.append(sampled_process(words, PROCESS_STEPS, interval_s=SHORT_INTERVAL_S))
+        told = f"`ingest` of {minutes:g} min {NAMES[kind]} {compression}"
+        notes.append(floor(told, middle(runs), PACKAGES))
         what = f"{minutes:g} min {NAMES[kind]} {compression}: whole process"
         rows += [faster_row(what, ours, name, took, goal) for (name, _, goal), took in zip(others, theirs, strict=True)]
     return rows, notes
@@ -380,16 +400,15 @@ def run(quick: bool, folder: Path | None = None) -> Section:
     """
     folder = folder or Path(tempfile.gettempdir()) / "ferryid-bench-logs"
     short, long, camera = (1.0, 1.0, 0.2) if quick else (12.0, 120.0, 3.0)
-    logs.make(
-        folder,
-        [
-            *((*one, minutes, False) for minutes in (short, long) for one in PLAIN),
-            *((*one, camera, True) for one in CAMERA),
-        ],
-    )
-    rows = against_rosbags(folder, short, long)
-    least, between_notes, zstd_s = against_least_work(folder, long)
-    rows += least
+    with preparing():
+        logs.make(
+            folder,
+            [
+                *((*one, minutes, False) for minutes in (short, long) for one in PLAIN),
+                *((*one, camera, True) for one in CAMERA),
+            ],
+        )
+    rows, between_notes, zstd_s = read_and_write(folder, short, long)
     with_camera, camera_note = against_whole_camera_log(folder, camera)
     by_rerun, rerun_notes = against_rerun(folder, short)
     processes, process_notes = as_process(folder, short, 1 if quick else 3)

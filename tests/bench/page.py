@@ -97,8 +97,8 @@ class Section:
         Times of work that was measured on the machine of the goals as well [s], by its name in `yardstick.THERE`.
     yardstick_s
         The yardstick, measured beside this part [s].
-    took_s
-        How long it took to measure this part [s].
+    took_s, made_s
+        How long this part took, and what of that went into making logs and archives [s].
     """
 
     title: str
@@ -109,6 +109,7 @@ class Section:
     same: Mapping[str, float] = field(default_factory=dict)
     yardstick_s: Sequence[float] = ()
     took_s: float = 0.0
+    made_s: float = 0.0
 
 
 def packed(section: Section) -> dict[str, Any]:
@@ -257,12 +258,19 @@ def page(sections: Sequence[Section], quick: bool, pictures: Sequence[tuple[str,
                 f"| {row.what} | {row.ours} | {row.rival} | {row.rival_value} | {row.ratio:.3g} | {row.goal} | {reached} |"
             )
         lines += ["", *(f"- {note}" for note in section.notes), ""]
-    parts = ", ".join(f"{section.title} {section.took_s:.0f} s" for section in sections)
     whole_s = sum(section.took_s for section in sections)
+    parts = [
+        f"| {section.title} | {section.took_s:.0f} s | {section.made_s:.0f} s | {sum(section.yardstick_s):.0f} s |"
+        for section in sections
+    ]
     lines += [
         "## How long this page takes",
         "",
-        f"{whole_s / 60:.1f} minutes, the yardstick and making logs among them: {parts}.",
+        f"{whole_s / 60:.1f} minutes.",
+        "",
+        "| part | takes | of that making logs and archives | and the yardstick |",
+        "|---|--:|--:|--:|",
+        *parts,
     ]
     return "\n".join(lines).rstrip() + "\n"
 

@@ -9,6 +9,10 @@ import subprocess
 import sys
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from tests.bench import sampled
+from tests.bench.page import duration
 
 
 def whole_process(
@@ -25,15 +29,20 @@ def whole_process(
     before
         Python that it runs before.
     """
-    # What the kernel tells of a child counts in the memory of the process that forked it: the child tells by itself.
-    program = (
-        "import atexit, sys; from ferryid.cli.main import main; "
-        "atexit.register(lambda: print(open('/proc/self/status').read().partition('VmHWM:')[2].split()[0], file=sys.stderr)); "
-        f"{before}; main()"
+    took, much, _ = _run(arguments, environment, f"from ferryid.cli.main import main; {before}; main()")
+    return took, much
+
+
+def _run(arguments: Sequence[str], environment: Mapping[str, str] | None, program: str) -> tuple[float, int, str]:
+    """Return time [s], peak memory [bytes] and errors of Python that runs a command."""
+    # What the kernel says of a child counts in the memory of the process that forked it: the child says it by itself.
+    peak = (
+        "import atexit, sys; "
+        "atexit.register(lambda: print(open('/proc/self/status').read().partition('VmHWM:')[2].split()[0], file=sys.stderr))"
     )
     start = time.perf_counter()
     run = subprocess.run(
-        [sys.executable, "-c", program, *arguments],
+        [sys.executable, "-c", f"{peak}; {program}", *arguments],
         capture_output=True,
         text=True,
         check=False,
@@ -42,108 +51,115 @@ def whole_process(
     took = time.perf_counter() - start
     if run.returncode:
         raise RuntimeError(f"ferryid {' '.join(arguments)} ended with {run.returncode}: {run.stderr}")
-    return took, int(run.stderr.split()[-1]) * 1024
+    return took, int(run.stderr.split()[-1]) * 1024, run.stderr
 
 
-TWICE = """
-import contextlib, io, json, sys, time
-from ferryid.cli.main import main
-took = []
-for words in json.loads(sys.argv[1]):
-    sys.argv = ["ferryid", *words]
-    start = time.perf_counter()
-    with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):
-        main()
-    took.append(time.perf_counter() - start)
-print("took", *took)
-"""
-"""Runs commands in one process: the second has everything loaded and compiled."""
+SHOWN = 8
+"""Functions that are listed by the time that they take."""
+LEAST_SHARE = 0.01
+"""Steps that take less of the whole are of the rest."""
+INTERVAL_S = 0.01
+"""Time between two looks at a process [s]."""
+SHORT_INTERVAL_S = 0.002
+"""The same for processes of a second or two."""
 
 
-def floor(what: str, whole_s: float, first: Sequence[str], again: Sequence[str], packages: Sequence[str]) -> str:
-    """Return what of a command's time nothing of ferryid can save, and what is the work itself, as a sentence.
+@dataclass(frozen=True)
+class Sampled:
+    """A command in a process of its own, and where its time went.
+
+    Attributes
+    ----------
+    took_s
+        Its time [s].
+    peak
+        Its peak memory [bytes].
+    steps
+        Of that time, what the main thread spent in each step [s]: starting and ending Python, loading, the command's own.
+    functions
+        The same by function of ferryid, with what it calls outside ferryid [s].
+    processor_s
+        Processor time of all of its threads and processes [s].
+    looks, looks_s
+        How often it was looked at, and what that took [s].
+    """
+
+    took_s: float
+    peak: int
+    steps: Mapping[str, float]
+    functions: Mapping[str, float]
+    processor_s: float
+    looks: int
+    looks_s: float
+
+    def where(self, what: str) -> str:
+        """Return where the time went, as sentences; `what` is the command."""
+        shown = {step: took for step, took in self.steps.items() if took >= LEAST_SHARE * self.took_s}
+        parts = ", ".join(f"{step} {duration(took)}" for step, took in shown.items())
+        most = sorted(self.functions.items(), key=lambda one: -one[1])[:SHOWN]
+        names = ", ".join(f"`{name}` {took / self.took_s:.0%}" for name, took in most)
+        cores, rest_s = os.cpu_count() or 1, max(self.took_s - sum(shown.values()), 0.0)
+        return (
+            f"Where the {duration(self.took_s)} of {what} go, by {self.looks} looks at the main thread, which took "
+            f"{duration(self.looks_s)}: {parts}, the rest {duration(rest_s)}. All of its threads and processes take "
+            f"{duration(self.processor_s)} of processor time: with {cores} cores busy throughout it would take "
+            f"{duration(self.processor_s / cores)}. By function, with what it calls outside ferryid: {names}."
+        )
+
+
+def sampled_process(
+    arguments: Sequence[str], steps: Mapping[str, Sequence[str]], before: str = "pass", interval_s: float = INTERVAL_S
+) -> Sampled:
+    """Return time and memory of one command in a process of its own, and where the time of its main thread went.
+
+    Parameters
+    ----------
+    arguments, before
+        As of `whole_process`.
+    steps
+        Functions of each step, as of `tests.bench.sampled.begin`.
+    interval_s
+        Time between two looks [s].
+    """
+    program = (
+        f"from tests.bench import sampled; atexit.register(sampled.begin({dict(steps)!r}, {interval_s})); "
+        f"from ferryid.cli.main import main; {before}; main()"
+    )
+    took, much, errors = _run(arguments, None, program)
+    found = json.loads(next(line for line in errors.splitlines() if line.startswith("sampled ")).partition(" ")[2])
+    by_step = {"starting and ending Python": max(took - found["seen_s"], 0.0)}
+    by_step |= {step: found["steps"][step] for step in (*sampled.LOADING, *steps) if step in found["steps"]}
+    more = (found[name] for name in ("functions", "processor_s", "looks", "looks_s"))
+    return Sampled(took, much, by_step, *more)
+
+
+def middle(runs: Sequence[Sampled]) -> Sampled:
+    """Return the middle one of several runs of a command by their time, with the most memory of all."""
+    return replace(sorted(runs, key=lambda run: run.took_s)[len(runs) // 2], peak=max(run.peak for run in runs))
+
+
+def floor(what: str, run: Sampled, packages: Sequence[str], repeats: int = 3) -> str:
+    """Return where a command's time goes, and what of it nothing of ferryid can save, as sentences.
 
     Parameters
     ----------
     what
         The command.
-    whole_s
-        What it takes as a process of its own [s].
-    first, again
-        Its words, and those of a second one that does the same work in the same process.
+    run
+        It, measured.
     packages
         What any program for this would import.
+    repeats
+        How often their import is measured; the median counts.
     """
     bare = [sys.executable, "-c", f"import {', '.join(packages)}"]
     alone = []
-    for _ in range(3):
+    for _ in range(repeats):
         start = time.perf_counter()
         subprocess.run(bare, check=True)
         alone.append(time.perf_counter() - start)
-    run = subprocess.run(
-        [sys.executable, "-c", TWICE, json.dumps([first, again])], check=True, capture_output=True, text=True
-    )
-    work_s = float(run.stdout.rpartition("took")[2].split()[1])
     import_s = statistics.median(alone)
     return (
-        f"{what}: of {whole_s:.2g} s, a process that only imports {', '.join(packages)} takes {import_s:.2g} s "
-        f"({import_s / whole_s:.0%}), and the work itself, done a second time in one process, {work_s:.2g} s "
-        f"({work_s / whole_s:.0%}). The rest is loading "
-        "other modules and compiled code, and what is done once."
+        f"{run.where(what)} A process that only imports {', '.join(packages)} takes {duration(import_s)} "
+        f"({import_s / run.took_s:.0%})."
     )
-
-
-PROFILED = """
-import contextlib, cProfile, io, json, pstats, sys
-from ferryid.cli.main import main
-from ferryid.side_by_side import keep_to_one_thread
-keep_to_one_thread()
-def run(words):
-    sys.argv = ["ferryid", *words]
-    with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):
-        main()
-stages, commands = json.loads(sys.argv[1])
-run(commands[0])
-for words in commands[1:]:
-    profile = cProfile.Profile()
-    profile.runcall(run, words)
-    found = pstats.Stats(profile)
-    by_stage = dict.fromkeys(stages, 0.0)
-    for (file, _, name), (_, _, own, whole, _) in found.stats.items():
-        for stage in stages:
-            folder, _, function = stage.rpartition(":")
-            if name == function and folder in file:
-                by_stage[stage] = max(by_stage[stage], whole)
-    own = sorted(((value[2], f"{key[0].rpartition('/')[2]}:{key[2]}") for key, value in found.stats.items()), reverse=True)
-    print("profiled", json.dumps({"total": found.total_tt, "stages": by_stage, "own": own[:20]}))
-"""
-"""Runs a command, and then others under a profiler, on one thread."""
-SHOWN = 8
-"""Functions that are listed by the time that they take themselves."""
-
-
-def where(stages: Mapping[str, str], first: Sequence[str], measured: Mapping[str, Sequence[str]]) -> list[str]:
-    """Return where the time of commands goes: by stage, and the functions that take most themselves; a sentence for each.
-
-    Parameters
-    ----------
-    stages
-        Functions whose time, all that they call included, is a stage's: ``part of the path:name`` by what the page says.
-    first
-        Words of a command after which everything is loaded and compiled.
-    measured
-        Words of the commands, by what they are.
-    """
-    arguments = json.dumps([list(stages.values()), [first, *measured.values()]])
-    run = subprocess.run([sys.executable, "-c", PROFILED, arguments], capture_output=True, text=True, check=True)
-    lines = [line for line in run.stdout.splitlines() if line.startswith("profiled ")]
-    told = []
-    for what, line in zip(measured, lines, strict=True):
-        found = json.loads(line.partition(" ")[2])
-        total = found["total"]
-        parts = "; ".join(f"{title} {found['stages'][name] / total:.0%}" for title, name in stages.items())
-        own = "; ".join(f"`{name}` {took / total:.0%}" for took, name in found["own"][:SHOWN])
-        told.append(
-            f"Where the time of {what} goes, on one thread: {parts}. By function, without what it calls: {own}."
-        )
-    return told

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -9,8 +11,9 @@ from types import SimpleNamespace
 import pytest
 
 from tests.bench import __main__ as bench
-from tests.bench import campaigns, yardstick
+from tests.bench import campaigns, commands, diagnosis, ingest, sampled, trials, yardstick
 from tests.bench.page import Curve, Row, Section, Timed
+from tests.bench.processes import Sampled
 
 ROWS: list[Row | Timed] = [
     Row("12 min", "1 s", "rosbags", "20 s", 20.0, "≥ 35", reached=False),
@@ -83,3 +86,69 @@ def test_memory_of_a_campaign_has_a_goal_of_its_own() -> None:
     timed = campaigns._timed("18 logs", (20.0, 2_500_000_000), 60.0)
     assert timed.row(yardstick.GOALS_S).reached is False
     assert campaigns._timed("18 logs", (20.0, 1_500_000_000), 60.0).row(yardstick.GOALS_S).reached is True
+
+
+BUSY = """
+import time
+from tests.bench import sampled
+end = sampled.begin({"outer": ("<string>:outer",), "inner": ("<string>:inner",)}, 0.001)
+def busy(seconds):
+    until = time.perf_counter() + seconds
+    while time.perf_counter() < until:
+        pass
+def inner(): busy(0.06)
+def outer(): busy(0.03); inner()
+outer()
+busy(0.03)
+end()
+"""
+
+
+def test_the_time_of_a_step_is_that_of_the_step_entered_last() -> None:
+    run = subprocess.run([sys.executable, "-c", BUSY], check=True, capture_output=True, text=True)
+    found = json.loads(run.stderr.partition("sampled ")[2])
+    took = found["steps"]
+    # A busy machine makes all of them longer.
+    assert took["inner"] >= 0.05
+    assert min(took["outer"], took[sampled.REST]) >= 0.02
+    assert sum(took.values()) == pytest.approx(found["seen_s"], abs=0.02)
+    assert found["looks"] >= 10
+
+
+def test_every_step_is_a_function_that_there_is() -> None:
+    root = Path(bench.__file__).parents[2]
+    sources = [f"/{path.relative_to(root)}" for path in (root / "ferryid").rglob("*.py")]
+
+    def exists(function: str) -> bool:
+        part, name = function.rsplit(":", 1)
+        texts = ((root / source[1:]).read_text(encoding="utf-8") for source in sources if part in source)
+        return any(f"def {name}(" in text for text in texts)
+
+    steps = (diagnosis.STEPS, commands.FIT_STEPS, commands.SIMULATION_STEPS, commands.BATCH_STEPS, ingest.PROCESS_STEPS)
+    named = [function for one in steps for functions in one.values() for function in functions]
+    named += [one for functions in sampled.LOADING.values() for one in functions if one.startswith("/ferryid/")]
+    assert [one for one in named if not exists(one)] == []
+
+
+def test_steps_that_take_little_are_of_the_rest() -> None:
+    steps = {"reading": 6.0, "writing": 0.05, "judging": 3.0}
+    run = Sampled(10.0, 10**9, steps, {"a.py:b": 5.0, "c.py:d": 1.0}, 16.0, 1000, 0.02)
+    said = run.where("a campaign")
+    assert "Where the 10 s of a campaign go, by 1000 looks at the main thread, which took 20 ms: " in said
+    assert "reading 6 s, judging 3 s, the rest 1 s. " in said
+    assert "`a.py:b` 50%, `c.py:d` 10%" in said
+
+
+def test_logs_are_simulated_once_in_a_run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    made: list[Path] = []
+
+    def simulated(path: Path, number: int, seconds: int, *, gaps: bool, after_s: int) -> None:
+        made.append(path)
+        path.touch()
+
+    monkeypatch.setattr(trials, "_kept", lambda: SimpleNamespace(name=str(tmp_path)))
+    monkeypatch.setattr(trials, "_write", simulated)
+    assert trials.written(range(3), 720) == [*trials.written([0, 1], 720), *trials.written([2], 720)]
+    # Of another length, or another wind, it is another log.
+    assert trials.written([0], 420) != trials.written([0], 720) != trials.written([0], 720, after_s=5)
+    assert len(made) == len(set(made)) == 5

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import math
+import tempfile
+from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
 
 from ferryid.simulate import load_scenario, simulate, write_log
+from tests.bench.preparing import preparing
 
 SCENARIO = """schema = "ferryid.scenario/1"
 title = "12-corner calibration of milliAmpère, again and again, in a breeze"
@@ -45,14 +49,18 @@ VESSEL = ("--vessel", "milliampere")
 SCALE = ("--delta", "0.4", "--sigma", "0.4")
 
 
-def written(folder: Path, number: int, seconds: int, *, gaps: bool = False, after_s: int = 60) -> Path:
-    """Return a log of this length as MCAP, simulated where the folder does not hold it.
+@cache
+def _kept() -> tempfile.TemporaryDirectory[str]:
+    """Return the folder of the logs of this run, which is gone when it ends: another run may have another simulator."""
+    return tempfile.TemporaryDirectory(prefix="ferryid-bench-trials-")
+
+
+def written(numbers: Iterable[int], seconds: int, *, gaps: bool = False, after_s: int = 60) -> list[Path]:
+    """Return logs of this length as MCAP; those that no part of this run has asked for before are simulated.
 
     Parameters
     ----------
-    folder
-        Where logs are kept.
-    number
+    numbers
         Each begins `after_s` after the one with the number before has ended, and, without gaps, has a wind of its own.
     seconds
         Length [s].
@@ -61,9 +69,16 @@ def written(folder: Path, number: int, seconds: int, *, gaps: bool = False, afte
     after_s
         Time between the logs [s].
     """
-    path = folder / f"{'gaps' if gaps else 'log'}{number:03d}-{seconds}.mcap"
-    if path.exists():
-        return path
+    folder = Path(_kept().name)
+    paths = {n: folder / f"{'gaps' if gaps else 'log'}{n:03d}-{seconds}-{after_s}.mcap" for n in numbers}
+    with preparing():
+        for number, path in paths.items():
+            if not path.exists():
+                _write(path, number, seconds, gaps=gaps, after_s=after_s)
+    return list(paths.values())
+
+
+def _write(path: Path, number: int, seconds: int, *, gaps: bool, after_s: int) -> None:
     start = 8 * 3600 + number * (seconds + after_s)
     clock = f"{start // 3600 % 24:02d}:{start % 3600 // 60:02d}:{start % 60:02d}"
     # Parts of one recording are in one wind.
@@ -80,4 +95,3 @@ def written(folder: Path, number: int, seconds: int, *, gaps: bool = False, afte
     toml = path.with_suffix(".toml")
     toml.write_text(text + (GAPS if gaps else ""), encoding="utf-8")
     write_log(simulate(load_scenario(str(toml))), path)
-    return path

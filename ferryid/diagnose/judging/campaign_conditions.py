@@ -371,24 +371,30 @@ def _tested(
     none = estimate_campaign(with_conditions(campaign, others), noise=made.noise, bare=bare)
     evidence = made.evidence - none.evidence
     loss = held_out_loss(none), held_out_loss(made)
-    gains = loss[1].gain(loss[0])
-    test = ConditionTest(effect, made, none, loss, evidence, Gain.of(gains), {})
+    test = ConditionTest(effect, made, none, loss, evidence, Gain.of(loss[1].gain(loss[0])), {})
     # What the evidence does not speak for needs no placebo to fall.
     if evidence < INFERENCE.prior_odds:
         return test
     progress("estimating the same on headings that the vessel did not have")
+    return replace(test, placebos=_against_placebos(test, bare))
+
+
+def _against_placebos(test: ConditionTest, bare: CampaignFit) -> dict[str, PlaceboTest]:
+    """Return how a condition does against the same one on headings that the vessel did not have, by what these are."""
+    made, none = test.fit, test.none
+    gains = test.loss[1].gain(test.loss[0])
     against: dict[str, PlaceboTest] = {}
-    for name, placebo in placebos(campaign, effect).items():
+    for name, placebo in placebos(made.campaign, test.effect).items():
         other = estimate_campaign(placebo, noise=made.noise, bare=bare)
-        over = gains - held_out_loss(other).gain(loss[0])
+        over = gains - held_out_loss(other).gain(test.loss[0])
         share, like = 0.0, 0.0
-        if not campaign.hull.known:
-            share = (other.evidence - none.evidence) / evidence
+        if not made.campaign.hull.known:
+            share = (other.evidence - none.evidence) / test.evidence
             like = imitated_share(made, none, other, test.rows)
         # Of three placebos that all must do worse beyond chance, one would too often not.
         surely = name != SHIFTED
         against[name] = PlaceboTest(Gain.of(over), made.evidence - other.evidence, share, like, surely)
-    return replace(test, placebos=against)
+    return against
 
 
 def _against_others(
