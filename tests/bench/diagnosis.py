@@ -34,7 +34,7 @@ STEPS = {
     ),
     "held-out blocks": ("/judging/campaign_evidence.py:held_out_loss",),
     "properties of all logs": ("/judging/campaign_properties.py:judge_properties",),
-    "changes of load between logs": ("/judging/load_changes.py:judge_load_change",),
+    "changes between logs": ("/judging/changes_between_logs.py:judge_change",),
     "estimating and selecting effects of each log": ("/inference/stages.py:estimate", "/inference/stages.py:select"),
     "judging effects of each log": ("/judging/judge.py:judge",),
     "the interval of an onset or end": ("/judging/findings.py:_time",),

@@ -26,7 +26,7 @@ from ferryid.types import AXES, IN_MEMORY, Flags, RunContext
 from ferryid.vessel import load_profile
 from ferryid.vessel.profile import Profile
 from tests.evidence import stamp
-from tests.real import aauship, causes, days, esso, groups, instruments, withheld
+from tests.real import aauship, causes, changes, days, esso, groups, instruments, withheld
 from tests.real.places import DATA, REPORTS
 
 ENVIRONMENT = ("wind", "current", "waves", "mooring", "gusts", "shallow_water")
@@ -68,7 +68,7 @@ def write() -> None:
     parts.append(aauship.section())
     print("Groups of logs, other instruments", flush=True)
     others = instruments.sources()
-    parts += [groups.section(), instruments.section(others)]
+    parts += [groups.section(), changes.section(), instruments.section(others)]
     withheld.store(hidden, others, REPORTS)
     minutes = (time.monotonic() - began) / 60.0
     parts.append(

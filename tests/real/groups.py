@@ -54,7 +54,7 @@ def cases() -> list[Case]:
 def judged(case: Case) -> JudgedGroups:
     """Compare the groups as ``diagnose --versus`` does."""
     logs = [
-        (_weakened(path, case.profile, case.factor if group == GROUPS[1] else 1.0), group)
+        (weakened(path, case.profile, case.factor if group == GROUPS[1] else 1.0), group)
         for group, paths in zip(GROUPS, case.groups, strict=True)
         for path in paths
     ]
@@ -67,7 +67,7 @@ def judged(case: Case) -> JudgedGroups:
     )
 
 
-def _weakened(path: str, profile: Profile, factor: float) -> AveragedLog:
+def weakened(path: str, profile: Profile, factor: float) -> AveragedLog:
     """Return a log whose recorded thrust is so large that what truly acted is a factor of it; rudders felt what acted."""
     screened = screen_sensors(measure_log(path, profile, IN_MEMORY), no_progress)
     seen = screened.measurements

@@ -73,6 +73,30 @@ class Change:
         return order[: self.count] if self.after else order[self.count :]
 
 
+@dataclass(frozen=True)
+class Weighed:
+    """A change at a time: the evidence that it would add if gaps were linear [nat], and how many logs are before the time."""
+
+    evidence: float
+    count: int
+    candidate: Candidate
+
+
+def weigh_changes(made: CampaignFit) -> list[Weighed]:
+    """Return every change of load or force at every time between logs, the likeliest first; none of too few logs.
+
+    Parameters
+    ----------
+    made
+        What the logs say together without such a change, settled under its noise.
+    """
+    order = made.campaign.order
+    if len(order) < 2 * INFERENCE.change_logs:
+        return []
+    weighed = [one for candidate in _changes(made, order) for one in _at_times(made, candidate, order)]
+    return sorted(weighed, key=lambda one: -one.evidence)
+
+
 def find_change(made: CampaignFit) -> Change | None:
     """Return a load or a fault that came or went between two logs; None where the evidence favours none.
 
@@ -81,17 +105,14 @@ def find_change(made: CampaignFit) -> Change | None:
     made
         What the logs say together, without such a change.
     """
-    order = made.campaign.order
-    if len(order) < 2 * INFERENCE.change_logs:
-        return None
     # What is compared has settled under one noise.
     made = estimate_campaign(made.campaign, noise=made.noise, begin=made)
-    weighed = [one for candidate in _changes(made, order) for one in _weighed(made, candidate, order)]
-    evidence, count, candidate = max(weighed, key=lambda one: one[0], default=(0.0, 0, None))
-    if candidate is None or evidence < INFERENCE.prior_odds:
+    weighed = weigh_changes(made)
+    if not weighed or weighed[0].evidence < INFERENCE.prior_odds:
         return None
-    grouped = replace(made, campaign=_parted(made.campaign, order, count))
-    rarity = {one.key: one.log_alternatives for _, _, one in weighed}
+    count = weighed[0].count
+    grouped = replace(made, campaign=_parted(made.campaign, made.campaign.order, count))
+    rarity = {one.candidate.key: one.candidate.log_alternatives for one in weighed}
     differences = [
         replace(one, log_alternatives=rarity.get(one.key, one.log_alternatives))
         for one in differences_of(grouped.campaign)
@@ -120,7 +141,7 @@ def _changes(made: CampaignFit, order: Sequence[int]) -> list[Candidate]:
     return [replace(one, log_alternatives=one.log_alternatives + ways) for one in differences if _may_change(one)]
 
 
-def _weighed(made: CampaignFit, change: Candidate, order: Sequence[int]) -> list[tuple[float, int, Candidate]]:
+def _at_times(made: CampaignFit, change: Candidate, order: Sequence[int]) -> list[Weighed]:
     """Return the evidence that a change adds, for every number of logs before it."""
     counts, after = range(INFERENCE.change_logs, len(order) - INFERENCE.change_logs + 1), change.group == GROUPS[1]
     ways = []
@@ -128,4 +149,5 @@ def _weighed(made: CampaignFit, change: Candidate, order: Sequence[int]) -> list
         acts = np.zeros(len(order), dtype=np.bool_)
         acts[list(order[count:] if after else order[:count])] = True
         ways.append(acts)
-    return [(gain, count, change) for gain, count in zip(gains_of_ways(made, change, ways), counts, strict=True)]
+    gains = gains_of_ways(made, change, ways)
+    return [Weighed(gain, count, change) for gain, count in zip(gains, counts, strict=True)]
