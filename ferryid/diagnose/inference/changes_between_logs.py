@@ -23,6 +23,7 @@ from ferryid.diagnose.inference.campaign_model import Campaign
 from ferryid.diagnose.inference.campaign_properties import LOADS
 from ferryid.diagnose.inference.candidate import Candidate
 from ferryid.diagnose.inference.group_differences import (
+    ALL_THRUSTERS,
     FAULTS,
     GROUPS,
     Contender,
@@ -59,6 +60,12 @@ class Change:
     def after(self) -> bool:
         """Whether it acts in the logs after the time."""
         return self.candidate.group == GROUPS[1]
+
+    @property
+    def scales_all(self) -> bool:
+        """Whether it is a factor of all forces, as one on all of the hull would be."""
+        names = self.fit.campaign.members[0].windows.measurements.names
+        return self.candidate.effect.id in FAULTS and (self.candidate.instance == ALL_THRUSTERS or len(names) == 1)
 
     @property
     def acting(self) -> tuple[int, ...]:

@@ -68,7 +68,8 @@ class Split:
 def find_split(campaign: Campaign, reference: Flags) -> Split | None:
     """Return how a campaign falls into two parts that no common hull fits; None where one fits all.
 
-    A load that came aboard between logs, or a thruster that weakened, is no other hull: beside it the logs are judged again.
+    A load that came aboard between logs, or one of several thrusters that weakened, is no other hull: beside it the logs are
+    judged again. A factor of all forces is: it does the same as one on all of the hull.
 
     Parameters
     ----------
@@ -81,7 +82,7 @@ def find_split(campaign: Campaign, reference: Flags) -> Split | None:
     if split is None:
         return None
     change = find_change(estimate_campaign(campaign))
-    return split if change is None else _found(change.fit.campaign, reference)
+    return split if change is None or change.scales_all else _found(change.fit.campaign, reference)
 
 
 def _found(campaign: Campaign, reference: Flags) -> Split | None:

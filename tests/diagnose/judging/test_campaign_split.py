@@ -13,6 +13,7 @@ from ferryid.diagnose.judging import campaign_split
 from ferryid.diagnose.judging.campaign_evidence import Gain
 from ferryid.diagnose.judging.campaign_split import Split, find_split
 from tests.diagnose.inference.test_campaign_estimation import CALM, WINDS, campaign
+from tests.diagnose.judging.test_group_differences import groups
 
 pytestmark = pytest.mark.slow
 
@@ -61,3 +62,15 @@ def test_a_hull_that_a_wind_hides_is_judged_beside_the_wind(
     assert (split is not None) == found
     if split is not None:
         assert (split.gain.total, split.ratio) == (gain, ratio)
+
+
+def test_a_thruster_that_weakened_between_logs_is_no_other_hull(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = groups((1.0, 1.0, 0.4), ("", "", ""))
+    whole = replace(whole, order=tuple(range(len(whole.members))))
+    none = np.zeros(len(whole.members), dtype=np.bool_)
+    assert find_split(whole, none) is None
+    # Unless the change is found, they are told apart as two vessels.
+    monkeypatch.setattr(campaign_split, "find_change", lambda made: None)
+    split = find_split(whole, none)
+    assert split is not None
+    assert split.inside.tolist() == [False] * 4 + [True] * 2

@@ -95,7 +95,9 @@ def test_what_scatters_from_log_to_log_is_no_difference_of_groups() -> None:
     factors = (0.7, 1.0, 1.3, 0.85, 1.15, 0.75)
     every = [member(number % 4, (factor, 1.0)) for number, factor in enumerate(factors)]
     mixed = estimate_campaign(groups(every[:3], every[3:]))
-    (gain,) = (one for one in differences_of(mixed.campaign) if one.key == ("thruster_gain", "thruster1"))
+    (gain,) = (
+        one for one in differences_of(mixed.campaign) if (*one.key, one.group) == ("thruster_gain", "thruster1", "B")
+    )
     scattered = compare_near(mixed, gain)
     assert scattered.scatter * 0.2 > 0.1
     assert scattered.evidence < 3.0
