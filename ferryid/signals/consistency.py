@@ -146,7 +146,7 @@ def _unit(gain: float, low: float, high: float, known: tuple[tuple[float, str], 
     near = [text for value, text in known if abs(abs(gain) / value - 1.0) < SIGNALS.unit_gain]
     held = [text for value, text in sorted(known) if text in near or least <= value <= most]
     if len(held) > 1:
-        return f"{' or '.join(held)}, the interval holds both", False
+        return f"{' or '.join(held)}, the interval holds {'both' if len(held) == 2 else 'all'}", False
     return "".join(near), bool(near)
 
 
