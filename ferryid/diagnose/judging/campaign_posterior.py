@@ -57,9 +57,11 @@ def campaign_posterior(
             if one.key in here and one.key in reported
         ]
         for one, p in zip(fit.campaign.properties, lasting, strict=True):
-            if one.key in reported:
-                # What was aboard may not be in the next log, and what came back after earlier logs is not lost any more.
-                kind = vessel if one.effect.vessel and one.group != GROUPS[0] else conditions
+            # What came back after earlier logs is not lost any more, and no model has it.
+            over = one.effect.vessel and one.group == GROUPS[0]
+            if one.key in reported and not over:
+                # What was aboard in all logs may not be in the next one.
+                kind = vessel if one.effect.vessel else conditions
                 kind += [_stored(each, p, reported[one.key], survey) for each in _one_by_one(one, names)]
     if own is not None:
         # What all logs say of a property stands above what one of them says.

@@ -16,6 +16,7 @@ from ferryid.diagnose.inference.campaign import CommonHull
 from ferryid.diagnose.inference.campaign_estimation import estimate_campaign
 from ferryid.diagnose.inference.campaign_properties import with_property
 from ferryid.diagnose.inference.estimation import Candidate
+from ferryid.diagnose.inference.group_differences import ALL_THRUSTERS, differences_of, in_groups
 from ferryid.diagnose.judging.campaign import JudgedCampaign
 from ferryid.diagnose.judging.campaign_conditions import JudgedConditions
 from ferryid.diagnose.judging.campaign_posterior import campaign_posterior
@@ -102,3 +103,30 @@ def test_a_load_of_all_logs_is_a_condition_of_each_and_no_property_of_the_vessel
     assert [one.effect for one in learned.conditions] == ["payload"]
     assert [one.effect for one in learned.vessel] == ["thruster_gain"]
     assert learned.conditions[0].parameters["mass"].value == 500.0
+
+
+@pytest.mark.parametrize(
+    ("group", "instance", "stored"),
+    [
+        ("", "thruster1", ["thruster1"]),
+        ("B", "thruster1", ["thruster1"]),
+        ("B", ALL_THRUSTERS, ["thruster1", "thruster2"]),
+        ("A", "thruster1", []),
+    ],
+    ids=["all along", "weakened", "all weakened", "came back"],
+)
+def test_a_loss_of_force_is_the_vessels_as_long_as_it_lasts(group: str, instance: str, stored: list[str]) -> None:
+    made = fitted()
+    whole = in_groups(made.campaign, ["A", "B", "B"])
+    (lost,) = (
+        one for one in differences_of(whole) if one.key == ("thruster_gain", instance) and one.group == (group or "B")
+    )
+    begun = with_property(replace(made, campaign=whole), replace(lost, group=group))
+    fit = estimate_campaign(begun.campaign, noise=made.noise, begin=begun)
+    together = JudgedCampaign(JudgedConditions(CommonHull(fit, {f"log{i}": i for i in range(len(WINDS))}), ()), ())
+    told = replace(found("thruster_gain", 0.99), instance=instance, parameters={"factor": Estimate(0.9, 0.8, 1.0, "-")})
+    taught = campaign_posterior(together, "log0" if group == "A" else "log1", None, [wind(), told], survey())
+    assert taught is not None
+    assert [one.instance for one in taught.vessel] == stored
+    # A model file has no lasting property among the conditions of a log.
+    assert [one.effect for one in taught.conditions] == ["wind"]
