@@ -10,7 +10,9 @@ been measured, and the hull's covariance keeps what that leaves uncertain.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -20,14 +22,14 @@ from ferryid.identify.outcome import LogWind
 from ferryid.identify.some_logs import some_logs
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.weak_rows import WeakRows
-from ferryid.identify.wind_samples import mean_loads
+from ferryid.identify.wind_samples import mean_loads, mean_slopes
 from ferryid.models.forces import ACCELERATIONS
 from ferryid.regression import STRIDES, window_rows, window_weights
 from ferryid.side_by_side import over
 from ferryid.signals.track import Motion
 from ferryid.types import Flags, Floats, Ints
 from ferryid.vessel.profile import Profile, WindAreas
-from ferryid.vessel.wind import relative_wind_force
+from ferryid.vessel.wind import relative_wind_force, relative_wind_slope
 
 _SAMPLES = 16
 """Points of a window at which the wind load is evaluated: it changes with heading and speed, not faster."""
@@ -36,8 +38,9 @@ _SPEEDS = (1.0, 3.0, 8.0)
 """Speeds at which the search starts [m/s]: at rest in still air the load has no slope."""
 _START_WINDOWS = 500
 """Windows of a log, evenly spaced, in which the starts are compared."""
-_STEP_MPS = 0.05
-"""Half the difference of winds by which the slope of the load is taken."""
+
+_SHARED = ("gains", "intercept", "sigma", "noise", "factor", "offset_spread", "wind_spread", "force_spread")
+"""What an estimate of several logs shares between them, by the names in `_Problem`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +65,8 @@ class Conditions:
         The load as a function of the mean wind, of the logs whose wind is estimated, by their numbers.
     indistinct
         True where no wind is estimated, as hull, wind and steady forces of the logs cannot be told apart.
+    start
+        With what an estimate from other windows of the same logs may begin.
     """
 
     wind: Floats
@@ -72,6 +77,7 @@ class Conditions:
     added: Floats
     blown: Mapping[int, BlownLoad] = field(default_factory=dict)
     indistinct: bool = False
+    start: Start | None = None
 
     @classmethod
     def none(cls, windows: Sequence[WeakRows], K: int) -> Conditions:
@@ -100,6 +106,28 @@ class Conditions:
             replace(one, steady=one.steady - load) if load.any() else one
             for one, load in zip(windows, self.load, strict=True)
         )
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """With what an estimate begins that another one of the same logs has gone before.
+
+    Attributes
+    ----------
+    wind
+        Mean winds of the logs, shape (L, 2); NaN where none was estimated.
+    shared
+        Hull, spreads and noise, by the names that they have in `_Problem`.
+    converged
+        Whether another step would have changed nothing.
+    settled
+        Whether spreads and noise are to stay as they are: to find them takes most of the steps.
+    """
+
+    wind: Floats
+    shared: Mapping[str, Any]
+    converged: bool
+    settled: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,20 +203,22 @@ class Load:
 
     def _mean(self, wind: Floats, every: int = 1) -> Floats:
         if self.many:
-            return np.asarray(self._means([wind], every)[0])
-        north, east = (np.broadcast_to(part, (len(self.cos),))[::every, None] for part in np.asarray(wind).T)
-        cos, sin = self.cos[::every], self.sin[::every]
-        along, across = cos * north + sin * east, cos * east - sin * north
-        load = relative_wind_force(self.areas, self.surge[::every] - along, self.sway[::every] - across)
+            return self._compiled_mean(wind, every)
+        load = relative_wind_force(self.areas, *self._relative(wind, every))
         return np.asarray(np.einsum("jsa,s->ja", load, self.weight)) / self.zeta
 
-    def _means(self, winds: Sequence[Floats], every: int = 1) -> Floats:
-        """Return the loads of several winds, (2,) or (J, 2) each, by the compiled loop, shape (winds, J, 3)."""
+    def _relative(self, wind: Floats, every: int = 1) -> tuple[Floats, Floats]:
+        """Return the velocity relative to the air, ahead and aside, shape (J, S) each, or in one of so many windows."""
+        north, east = (np.broadcast_to(part, (len(self.cos),))[::every, None] for part in np.asarray(wind).T)
+        cos, sin = self.cos[::every], self.sin[::every]
+        return self.surge[::every] - (cos * north + sin * east), self.sway[::every] - (cos * east - sin * north)
+
+    def _compiled_mean(self, wind: Floats, every: int) -> Floats:
         cos, sin, surge, sway = (
             np.ascontiguousarray(one[::every]) for one in (self.cos, self.sin, self.surge, self.sway)
         )
-        each = np.array([np.broadcast_to(wind, (len(self.cos), 2))[::every] for wind in winds])
-        return mean_loads(each, cos, sin, surge, sway, self.weight, shape_of(self.areas)) / self.zeta
+        each = np.ascontiguousarray(np.broadcast_to(wind, (len(self.cos), 2))[::every])
+        return np.asarray(mean_loads(each, cos, sin, surge, sway, self.weight, shape_of(self.areas))) / self.zeta
 
     def of(self, wind: Floats, every: int = 1) -> Floats:
         """Return the load beyond that of still air, shape (J, 3), or of one in so many windows.
@@ -197,13 +227,21 @@ class Load:
         """
         return self._mean(wind, every) - self.still[::every]
 
-    def slope(self, wind: Floats) -> Floats:
-        """Return its derivative with respect to the wind, shape (J, 3, 2)."""
-        steps = _STEP_MPS * np.eye(2)
+    def with_slope(self, wind: Floats) -> tuple[Floats, Floats]:
+        """Return the load beyond that of still air, shape (J, 3), and its derivative by the wind, (J, 3, 2)."""
         if self.many:
-            ahead, back = self._means([wind + s for s in steps]), self._means([wind - s for s in steps])
-            return np.ascontiguousarray(((ahead - back) / (2.0 * _STEP_MPS)).transpose(1, 2, 0))
-        return np.stack([(self._mean(wind + s) - self._mean(wind - s)) / (2.0 * _STEP_MPS) for s in steps], axis=2)
+            each = np.ascontiguousarray(np.broadcast_to(wind, (len(self.cos), 2)))
+            load, slope = mean_slopes(
+                each, self.cos, self.sin, self.surge, self.sway, self.weight, shape_of(self.areas)
+            )
+            return load / self.zeta - self.still, slope / self.zeta
+        load, by_u, by_v = (
+            np.einsum("jsa,s->jas", one, self.weight) for one in relative_wind_slope(self.areas, *self._relative(wind))
+        )
+        # The wind to north takes cos from the velocity ahead and gives sin to that aside, the one to east takes sin and cos.
+        north = np.einsum("jas,js->ja", by_v, self.sin) - np.einsum("jas,js->ja", by_u, self.cos)
+        east = -np.einsum("jas,js->ja", by_u, self.sin) - np.einsum("jas,js->ja", by_v, self.cos)
+        return load.sum(axis=2) / self.zeta - self.still, np.stack([north, east], axis=2) / self.zeta
 
 
 def estimate_conditions(
@@ -216,6 +254,7 @@ def estimate_conditions(
     mask: Flags,
     prior_spread: Floats,
     posed: Flags,
+    start: Start | None = None,
 ) -> Conditions:
     """Estimate the steady wind of every log in which it was not measured.
 
@@ -237,6 +276,8 @@ def estimate_conditions(
         Standard deviations of the gains of the weak form, shape (K, 3); infinite where nothing is known.
     posed
         Axes whose acceleration comes from poses, shape (3,).
+    start
+        What was found in other windows of the same logs; None where nothing was.
     """
     nothing = Conditions.none(windows, len(terms))
     areas = profile.wind
@@ -251,7 +292,7 @@ def estimate_conditions(
     if not loads:
         return nothing
     problem = _Problem(windows, terms, mask, prior_spread, posed, length_s / STRIDES)
-    wind, covariance = problem.solve(loads)
+    wind, covariance = problem.solve(loads, start)
     if not problem.converged and problem.force_spread > IDENTIFY.most_steady_force:
         return replace(nothing, indistinct=True)
     return Conditions(
@@ -265,6 +306,7 @@ def estimate_conditions(
         ),
         problem.added(),
         {k: BlownLoad(load, problem.gusts.found[k]) for k, load in loads.items()},
+        start=Start(wind, problem.shared(), problem.converged),
     )
 
 
@@ -374,17 +416,21 @@ class _Problem:
                 G[:, column] -= self.gains[self.terms.index(name)]
         return G
 
-    def solve(self, loads: Mapping[int, Load]) -> tuple[Floats, Floats]:
+    def solve(self, loads: Mapping[int, Load], start: Start | None = None) -> tuple[Floats, Floats]:
         L = len(self.windows)
         wind, covariance = np.zeros((L, 2)), np.zeros((L, 2, 2))
         places = some_logs([len(one) for one in self.windows])
-        begun = True
-        if len(places) == L:
+        begun, known = True, np.full((L, 2), np.nan)
+        if start is not None:
+            self._take_over(start.shared)
+            self.settled, known = start.settled, start.wind
+            begun = start.converged or not start.settled
+        elif len(places) == L:
             self._step({}, wind)
         else:
             begun = self._begin_as(places, loads)
         for k, load in loads.items():
-            wind[k] = self._start(k, load)
+            wind[k] = known[k] if np.isfinite(known[k]).all() else self._start(k, load)
         for _ in range(IDENTIFY.condition_steps):
             before, hull = wind.copy(), self._hull()
             covariance = self._step(loads, wind)
@@ -405,10 +451,18 @@ class _Problem:
         self.settled = True
         some = _Problem([self.windows[k] for k in places], *self._of)
         some.solve({number: loads[k] for number, k in enumerate(places) if k in loads})
-        for name in ("gains", "intercept", "sigma", "noise", "factor", "offset_spread", "wind_spread", "force_spread"):
-            setattr(self, name, getattr(some, name))
-        self.gusts.spread = some.gusts.spread
+        self._take_over(some.shared())
         return some.converged
+
+    def shared(self) -> dict[str, Any]:
+        """Return hull, spreads and noise, which no log has of its own."""
+        return {name: copy(getattr(self, name)) for name in _SHARED} | {"gusts": self.gusts.spread}
+
+    def _take_over(self, shared: Mapping[str, Any]) -> None:
+        """Take over what `shared` of another estimate returned."""
+        for name in _SHARED:
+            setattr(self, name, copy(shared[name]))
+        self.gusts.spread = shared["gusts"]
 
     def _start(self, k: int, load: Load) -> Floats:
         """Return the likeliest wind of a log for the hull found so far, of some directions and speeds."""
@@ -476,8 +530,9 @@ class _Problem:
         """Return the normal equations of one log, linearised about a wind."""
         J, G = len(self.windows[k]), self._G()
         blown = wind + self.gusts.found[k]
-        X, Y = self._table(k, np.zeros((J, 3)) if load is None else load.of(blown))
-        slope = np.zeros((J, 3, 2)) if load is None else -np.einsum("ab,jbc->jac", G, load.slope(blown))
+        force, by_wind = (np.zeros((J, 3)), np.zeros((J, 3, 2))) if load is None else load.with_slope(blown)
+        X, Y = self._table(k, force)
+        slope = -np.einsum("ab,jbc->jac", G, by_wind)
         Y = Y + np.einsum("jac,jc->ja", slope, blown)
         self.slopes[k] = slope
         columns = []

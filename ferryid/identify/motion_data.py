@@ -202,7 +202,11 @@ class LogData(MotionData):
         if self.split.kind != "blocks":
             return None
         nothing = tuple(np.zeros_like(motion.valid) for motion in self.motions)
-        return replace(self, split=Split("none", tuple(motion.valid for motion in self.motions), nothing, 0.0))
+        return self.with_split(Split("none", tuple(motion.valid for motion in self.motions), nothing, 0.0))
+
+    def with_split(self, split: Split) -> Self:
+        """Return the same logs with other training and validation rows."""
+        return replace(self, split=split)
 
     @property
     def qualities(self) -> Sequence[Mapping[str, Any]]:

@@ -21,11 +21,12 @@ from ferryid.identify.feasible import Feasible, LiftTie, feasible_gains
 from ferryid.identify.fit_data import Estimate
 from ferryid.identify.inertia import relative_inertia, without_inertia
 from ferryid.identify.log_condition import KindOutcome, LogCondition, conditions_json
-from ferryid.identify.log_conditions import Conditions, LoadSamples, estimate_conditions, sample_load
+from ferryid.identify.log_conditions import Conditions, LoadSamples, Start, estimate_conditions, sample_load
 from ferryid.identify.motion_data import LogData
 from ferryid.identify.outcome import Excitation, LogWind
 from ferryid.identify.prediction_windows import PredictionWindows
 from ferryid.identify.settings import FOLDS
+from ferryid.identify.split import Split
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.weak_rows import WeakRows, to_force
 from ferryid.models.forces import ACCELERATIONS, MAPPED, without_sway_coupling
@@ -91,11 +92,14 @@ class WeakData(LogData):
         Of the kinds of conditions, besides wind, that logs have of their own, the spread between logs in sizes.
     own_kinds
         What spoke for each kind that was considered.
+    start
+        What was found in other windows of the same logs, with which the estimate of winds begins.
     """
 
     training_s: float | None = field(default=None, kw_only=True)
     own_spreads: Mapping[str, float] = field(default_factory=dict, kw_only=True)
     own_kinds: tuple[KindOutcome, ...] = field(default=(), kw_only=True)
+    start: Start | None = field(default=None, kw_only=True)
 
     @cached_property
     def windows(self) -> PredictionWindows:
@@ -207,7 +211,13 @@ class WeakData(LogData):
             self.functions.mask,
             self.prior_spread,
             self._posed,
+            self.start,
         )
+
+    def with_split(self, split: Split) -> Self:
+        """Return the same logs with other training and validation rows; spreads between logs and noise are those of these."""
+        start = None if self.impossible else self.conditions.start
+        return replace(self, split=split, start=start and replace(start, settled=True))
 
     @property
     def load_samples(self) -> tuple[LoadSamples | None, ...]:

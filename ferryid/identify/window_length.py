@@ -49,8 +49,12 @@ def best_length(candidates: Mapping[float, Data]) -> Data:
         return usual
     at = np.concatenate([one.regressors(usual.functions.terms) for one in usual.training_windows])
     at = at - at.mean(axis=0)
-    scatter = {share: float(np.nansum(np.log(prediction_scatter(candidates[share], at)))) for share in enough}
-    return candidates[min(scatter, key=lambda share: scatter[share])]
+    start = usual.conditions.start
+    tried = {
+        share: usual if candidates[share] is usual else replace(candidates[share], start=start) for share in enough
+    }
+    scatter = {share: float(np.nansum(np.log(prediction_scatter(one, at)))) for share, one in tried.items()}
+    return tried[min(scatter, key=lambda share: scatter[share])]
 
 
 def prediction_scatter(data: WeakData, at: Floats) -> Floats:

@@ -57,3 +57,33 @@ def relative_wind_force(areas: WindAreas, u_rw: Floats, v_rw: Floats, *, air_den
     arm = areas.S_L_m + 0.18 * areas.length_m * (0.5 * math.pi - np.arctan2(np.abs(v_rw), u_rw))
     load[..., 2] = arm * load[..., 1]
     return load
+
+
+def relative_wind_slope(areas: WindAreas, u_rw: Floats, v_rw: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return the wind load of `relative_wind_force`, and its derivatives by the velocities relative to the air.
+
+    Shapes (n, 3) each, the load in [N, N, N·m], its derivatives by `u_rw` and by `v_rw` [N·s/m, N·s/m, N·s]. In still air,
+    where the load is of second order, they are zero.
+    """
+    square = np.maximum(u_rw * u_rw + v_rw * v_rw, np.finfo(np.float64).tiny)
+    cd_l = areas.CD_l_AF * areas.frontal_m2 / areas.lateral_m2
+    oblique = 0.5 * areas.delta * (1.0 - cd_l / areas.CD_t)
+    u_share, v_share = u_rw / square, v_rw / square
+    sin_2gamma = 2.0 * u_rw * v_share
+    denominator = 1.0 - oblique * (sin_2gamma * sin_2gamma)
+    pressure = -0.5 * AIR_DENSITY * np.sqrt(square) / denominator
+    # Of the logarithm of the pressure: that of the speed, and that of the denominator, as the angle turns.
+    turning = 4.0 * oblique * sin_2gamma * (v_rw * v_share - u_rw * u_share) / denominator
+    by_u = pressure * (u_share + turning * v_share)
+    by_v = pressure * (v_share - turning * u_share)
+    ahead, aside = areas.CD_l_AF * areas.frontal_m2, areas.CD_t * areas.lateral_m2
+    reach = 0.18 * areas.length_m
+    arm = areas.S_L_m + reach * (0.5 * math.pi - np.arctan2(np.abs(v_rw), u_rw))
+    load, slope_u, slope_v = (np.empty((*np.shape(square), 3)) for _ in range(3))
+    load[..., 0], load[..., 1] = ahead * pressure * u_rw, aside * pressure * v_rw
+    slope_u[..., 0], slope_u[..., 1] = ahead * (pressure + u_rw * by_u), aside * v_rw * by_u
+    slope_v[..., 0], slope_v[..., 1] = ahead * u_rw * by_v, aside * (pressure + v_rw * by_v)
+    load[..., 2] = arm * load[..., 1]
+    slope_u[..., 2] = arm * slope_u[..., 1] + reach * np.abs(v_share) * load[..., 1]
+    slope_v[..., 2] = arm * slope_v[..., 1] - reach * np.sign(v_rw) * u_share * load[..., 1]
+    return load, slope_u, slope_v

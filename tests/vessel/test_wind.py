@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ferryid.vessel import load_profile
-from ferryid.vessel.wind import wind_force
+from ferryid.vessel.wind import relative_wind_force, relative_wind_slope, wind_force
 
 WIND = load_profile("milliampere").wind
 assert WIND is not None
@@ -72,3 +73,25 @@ def test_rows_are_independent() -> None:
     both = wind_force(WIND, ne, psi, nu)
     single = np.array([wind_force(WIND, ne[i : i + 1], psi[i : i + 1], nu[i : i + 1])[0] for i in (0, 1)])
     assert both == pytest.approx(single)
+
+
+def test_slopes_are_the_limits_of_differences() -> None:
+    rng = np.random.default_rng(4)
+    u, v = rng.uniform(-9.0, 9.0, (2, 300))
+    areas = replace(WIND, S_L_m=0.4)
+    load, by_u, by_v = relative_wind_slope(areas, u, v)
+    np.testing.assert_allclose(load, relative_wind_force(areas, u, v), rtol=1e-12, atol=1e-12)
+    h = 1e-5
+    for slope, (du, dv) in ((by_u, (h, 0.0)), (by_v, (0.0, h))):
+        ahead, astern = (relative_wind_force(areas, u + sign * du, v + sign * dv) for sign in (1.0, -1.0))
+        np.testing.assert_allclose(slope, (ahead - astern) / (2.0 * h), rtol=1e-6, atol=1e-5)
+
+
+def test_slopes_on_the_bow_and_in_still_air() -> None:
+    # The load ahead is a square of the speed: its slope is twice the load over the speed, and aside it is C_Y' alone.
+    load, by_u, by_v = relative_wind_slope(WIND, np.array([10.0, 0.0]), np.zeros(2))
+    np.testing.assert_allclose(by_u[0], 2.0 * load[0] / 10.0)
+    np.testing.assert_allclose(by_v[0, :2], [0.0, -0.5 * 1.225 * 10.0 * 0.9 * 8.6])
+    assert not load[1].any()
+    np.testing.assert_allclose(by_u[1], 0.0, atol=1e-100)
+    np.testing.assert_allclose(by_v[1], 0.0, atol=1e-100)
