@@ -20,7 +20,7 @@ def fold_error(data: LogData, components: int) -> float:
     """Return the squared prediction error over the base model's on folds of the training rows; see `EstimatorScore.folds`."""
     base, model = np.zeros(3), np.zeros(3)
     for part in _parts(data.split):
-        one = data.with_split(part)
+        one = data.fold(part)
         try:
             found = estimate_correction(one, components, 0, no_progress).coefficients
         except FerryIdError:

@@ -403,6 +403,10 @@ class _Problem:
         """Whether another step would change nothing."""
         self.settled = False
         """Whether spreads and noise stay as they are."""
+        self._course = list[Floats]()
+        """Logarithms of the spreads since they were last taken ahead."""
+        self._moved = np.zeros((len(windows), 2))
+        """By how much the last step moved each wind."""
 
     def _table(self, k: int, load: Floats) -> tuple[Floats, Floats]:
         """Return functions and target of a log under a wind load."""
@@ -512,7 +516,10 @@ class _Problem:
             if k in loads:
                 step = found[:2] - wind[k]
                 most = max(IDENTIFY.wind_spread_mps, float(np.linalg.norm(wind[k])))
-                wind[k] += step * min(1.0, most / max(float(np.linalg.norm(step)), 1e-9))
+                step *= min(1.0, most / max(float(np.linalg.norm(step)), 1e-9))
+                # One that goes back where it came from would go to and fro for ever.
+                self._moved[k] = step * (0.5 if step @ self._moved[k] < 0.0 else 1.0)
+                wind[k] += self._moved[k]
                 covariance[k] = spread[:2, :2]
                 winds.append(float(np.sum(squares[:2])))
             if len(left[-1]):
@@ -524,7 +531,21 @@ class _Problem:
             self._spreads(winds, forces)
             self._noise(left)
             self.gusts.update()
+            self._hasten()
         return covariance
+
+    def _hasten(self) -> None:
+        """Take the spreads where expectation and maximisation would arrive: every third step is Aitken's."""
+        self._course.append(np.log([self.wind_spread, self.force_spread, self.gusts.spread]))
+        if len(self._course) < 3:
+            return
+        first, second, third = self._course
+        before, last = second - first, third - second
+        kept = np.clip(last / np.where(before != 0.0, before, np.inf), 0.0, IDENTIFY.most_kept)
+        spreads = np.exp(third + last * kept / (1.0 - kept))
+        self.wind_spread, self.force_spread = float(spreads[0]), float(spreads[1])
+        self.gusts.spread = float(max(spreads[2], IDENTIFY.least_gust_mps))
+        self._course.clear()
 
     def _equations(self, k: int, load: Load | None, wind: Floats) -> _Equations:
         """Return the normal equations of one log, linearised about a wind."""

@@ -202,10 +202,10 @@ class LogData(MotionData):
         if self.split.kind != "blocks":
             return None
         nothing = tuple(np.zeros_like(motion.valid) for motion in self.motions)
-        return self.with_split(Split("none", tuple(motion.valid for motion in self.motions), nothing, 0.0))
+        return replace(self, split=Split("none", tuple(motion.valid for motion in self.motions), nothing, 0.0))
 
-    def with_split(self, split: Split) -> Self:
-        """Return the same logs with other training and validation rows."""
+    def fold(self, split: Split) -> Self:
+        """Return the same logs of whose training rows some validate."""
         return replace(self, split=split)
 
     @property

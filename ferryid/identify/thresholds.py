@@ -200,6 +200,12 @@ class IdentifyThresholds:
     sample_windows: int = threshold(
         20_000, "windows", "fewest of these logs", "derived: fits of this many choose as those of all do, in a second"
     )
+    most_kept: float = threshold(
+        0.9,
+        "of the last step",
+        "most that a step of expectation and maximisation is believed to keep of the one before",
+        "convention: no more than nine steps are taken at once",
+    )
     settled_step: float = threshold(
         0.02,
         "standard errors",

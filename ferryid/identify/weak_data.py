@@ -214,8 +214,8 @@ class WeakData(LogData):
             self.start,
         )
 
-    def with_split(self, split: Split) -> Self:
-        """Return the same logs with other training and validation rows; spreads between logs and noise are those of these."""
+    def fold(self, split: Split) -> Self:
+        """Return the same logs of whose training rows some validate; spreads and noise are those of all of them."""
         start = None if self.impossible else self.conditions.start
         return replace(self, split=split, start=start and replace(start, settled=True))
 

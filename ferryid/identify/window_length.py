@@ -54,7 +54,8 @@ def best_length(candidates: Mapping[float, Data]) -> Data:
         share: usual if candidates[share] is usual else replace(candidates[share], start=start) for share in enough
     }
     scatter = {share: float(np.nansum(np.log(prediction_scatter(one, at)))) for share, one in tried.items()}
-    return tried[min(scatter, key=lambda share: scatter[share])]
+    # What is estimated in the end depends on nothing but its own windows.
+    return candidates[min(scatter, key=lambda share: scatter[share])]
 
 
 def prediction_scatter(data: WeakData, at: Floats) -> Floats:

@@ -16,6 +16,7 @@ from ferryid.identify.gusts import Gusts
 from ferryid.identify.log_conditions import Conditions, Load, LoadSamples
 from ferryid.identify.outcome import LogWind
 from ferryid.identify.some_logs import some_logs
+from ferryid.identify.split import Split
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.weak_data import WeakData
 from ferryid.models.forces import Estimator, effective_mass
@@ -258,8 +259,8 @@ def test_winds_that_drift_with_steady_forces_are_not_given(
 ) -> None:
     solve = log_conditions._Problem.solve
 
-    def solved(self: log_conditions._Problem, loads: Any) -> tuple[Floats, Floats]:
-        found = solve(self, loads)
+    def solved(self: log_conditions._Problem, loads: Any, start: Any = None) -> tuple[Floats, Floats]:
+        found = solve(self, loads, start)
         self.converged, self.force_spread = converged, spread * IDENTIFY.most_steady_force
         return found
 
@@ -276,8 +277,8 @@ def test_winds_of_many_logs_settle_where_those_of_some_do(monkeypatch: pytest.Mo
     monkeypatch.setattr("ferryid.identify.some_logs.IDENTIFY", replace(IDENTIFY, sample_logs=3, sample_windows=1))
     solve = log_conditions._Problem.solve
 
-    def solved(self: log_conditions._Problem, loads: Any) -> tuple[Floats, Floats]:
-        found = solve(self, loads)
+    def solved(self: log_conditions._Problem, loads: Any, start: Any = None) -> tuple[Floats, Floats]:
+        found = solve(self, loads, start)
         if len(self.windows) == 3:
             self.converged, self.force_spread = self.converged and settled, 1.1 * IDENTIFY.most_steady_force
         return found
@@ -285,3 +286,47 @@ def test_winds_of_many_logs_settle_where_those_of_some_do(monkeypatch: pytest.Mo
     monkeypatch.setattr(log_conditions._Problem, "solve", solved)
     data = data_of([measured(k, seconds=300.0, jitter=0.01, noise=4.0, force=blown) for k in range(6)])
     assert data.conditions.indistinct != settled
+
+
+def test_a_fold_keeps_the_spreads_and_takes_few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    data = data_of([measured(k, seconds=300.0, jitter=0.01, noise=4.0, force=blown) for k in range(3)])
+    every, steps = data.conditions, list[bool]()
+    step = log_conditions._Problem._step
+
+    def counted(self: log_conditions._Problem, *given: Any) -> Floats:
+        steps.append(self.settled)
+        return step(self, *given)
+
+    monkeypatch.setattr(log_conditions._Problem, "_step", counted)
+    rows = data.split.training
+    held = tuple(np.arange(len(one)) > 0.8 * len(one) for one in rows)
+    split = Split("folds", tuple(one & ~out for one, out in zip(rows, held, strict=True)), held, data.split.purge_s)
+    fold = data.fold(split).conditions
+    few = len(steps)
+    assert 0 < few < 8
+    assert all(steps)
+    assert (fold.spread_mps, fold.gust_mps) == (every.spread_mps, every.gust_mps)
+    anew = replace(data, split=split).conditions
+    assert len(steps) - few > few
+    np.testing.assert_allclose(fold.wind, anew.wind, atol=0.1)
+
+
+@pytest.mark.parametrize(("kept", "arrives"), [(0.5, True), (0.8, True), (0.99, False), (-0.3, False)])
+def test_every_third_step_of_the_spreads_is_aitkens(kept: float, arrives: bool) -> None:
+    data = data_of([measured(0, seconds=120.0)])
+    problem = log_conditions._Problem(
+        data.windows.training, data.functions.terms, data.functions.mask, data.prior_spread, data._posed, 1.0
+    )
+    # Steps that keep a share of the one before lead from 1 to 0.5, and another spread stays where it is.
+    for number in range(3):
+        problem.gusts.spread = 0.5 * 2.0 ** (kept**number)
+        problem.force_spread = 0.2
+        last = problem.gusts.spread
+        problem._hasten()
+    assert problem.force_spread == pytest.approx(0.2)
+    if arrives:
+        assert problem.gusts.spread == pytest.approx(0.5)
+    elif kept > 0.0:
+        assert 0.5 < problem.gusts.spread < last
+    else:
+        assert problem.gusts.spread == last
