@@ -20,6 +20,8 @@ ELSEWHERE = "other coefficients"
 """Instance of a hull that is named wrong in coefficients which are right."""
 LEVEL = 0.95
 HULL = "hull_parameters"
+NOT_CONFIRMED, NO_HULL_MODEL = "not confirmed: ", "The profile has no hull model"
+"""How a finding of a campaign says why it is a hint, and how the note begins that makes findings of a single log hints."""
 
 
 @dataclass(frozen=True)
@@ -157,6 +159,26 @@ def outcome_of_missed(result: CaseResult, key: Key) -> str:
         return "dropped"
     other = first_name(result)
     return other if other in (UNKNOWN, NONE, OTHER) else f"taken for {other}"
+
+
+def why_missed(result: CaseResult, key: Key) -> str:
+    """Return why an effect that is in the log of a case was not named, in the diagnosis's words; empty where it has none."""
+    effect = effects().get(key[0])
+    title = key[0] if effect is None else titled(effect.title, key[1])
+    reasons = []
+    for one in result.diagnosis.findings:
+        if one.key == key and one.hint:
+            reasons.append(one.says.partition(NOT_CONFIRMED)[2].strip(" .:"))
+    for note in result.diagnosis.notes:
+        what, found, why = note.partition(" is a hint: ")
+        if found and what.lower() == title.lower():
+            reasons.append(why.removesuffix("."))
+        what, found, why = note.partition(" considered, but dropped: ")
+        if found and title.lower() in what.lower():
+            reasons.append(f"dropped, as {why.removesuffix('.')}")
+    if not any(reasons) and any(note.startswith(NO_HULL_MODEL) for note in result.diagnosis.notes):
+        reasons.append("the profile has no hull model, and one log does not show how its hull moves")
+    return "; ".join(dict.fromkeys(filter(None, reasons)))
 
 
 def first_name(result: CaseResult) -> str:

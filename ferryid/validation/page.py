@@ -122,7 +122,7 @@ def _sea(scores: SeaScores) -> dict[str, Any]:
             one.effect or "nothing but the wind",
             f"{one.size:.3g} {units[one.effect]}" if one.effect else "",
             f"{one.seen:.1f}" if one.effect else "",
-            {True: "yes", False: "no"}[one.named] if one.effect else "",
+            ("yes" if one.named else f"no ({one.missed})" if one.missed else "no") if one.effect else "",
             f"{one.wind_seen:.1f}",
             {True: "yes", False: "no"}[one.wind_named],
             ", ".join(one.wrong),

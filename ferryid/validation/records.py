@@ -41,6 +41,8 @@ class Finding(Record):
         When it began and ended [s], None where it acted from the start, or to the end.
     log
         Number of the log of a campaign that it is of.
+    says
+        As in ``ferryid.diagnosis/1``.
     """
 
     effect: str
@@ -53,6 +55,7 @@ class Finding(Record):
     onset: float | None = None
     offset: float | None = None
     log: int = 0
+    says: str = ""
 
     @property
     def key(self) -> Key:

@@ -10,7 +10,7 @@ from ferryid.json_record import Record
 from ferryid.validation.campaign_oracle import deviation, visible
 from ferryid.validation.case import Truth
 from ferryid.validation.estimate_errors import EstimateErrors, estimate_errors
-from ferryid.validation.name_scores import Share, names, wrong_names
+from ferryid.validation.name_scores import Share, names, outcome_of_missed, why_missed, wrong_names
 from ferryid.validation.records import CaseResult
 
 SEA = "sea"
@@ -37,6 +37,8 @@ class SeaCampaign(Record):
         Whether the diagnosis named them.
     wrong
         Names of what is not in the logs.
+    missed
+        What became of an effect that was not named, and why; empty where it was named, or nothing was concealed.
     """
 
     effect: str
@@ -46,6 +48,7 @@ class SeaCampaign(Record):
     named: bool
     wind_named: bool
     wrong: tuple[str, ...]
+    missed: str = ""
 
 
 @dataclass(frozen=True)
@@ -100,7 +103,16 @@ def _campaign(result: CaseResult) -> SeaCampaign:
         concealed is not None and concealed.key in named,
         wind.key in named,
         tuple(" ".join(filter(None, key)) for key in wrong_names(result)),
+        "" if concealed is None or concealed.key in named else _missed(result, concealed),
     )
+
+
+def _missed(result: CaseResult, truth: Truth) -> str:
+    outcome, why = outcome_of_missed(result, truth.key), why_missed(result, truth.key)
+    if outcome == f"taken for {WIND}":
+        # The wind of the day is in every campaign.
+        outcome = "the wind of the day alone was named"
+    return f"{outcome}: {why}" if why else outcome
 
 
 def _seen(result: CaseResult, truth: Truth) -> float:

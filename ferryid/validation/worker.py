@@ -27,7 +27,7 @@ UNWRITABLE = "unwritable"
 """Key of an answer that is no diagnosis: why what comes of it could not be written."""
 RIVALS = 2
 """How many rivals of a finding are kept."""
-KEPT = ("effect", "instance", "probability", "parameters", "improvement", "unresolved_with")
+KEPT = ("effect", "instance", "probability", "parameters", "improvement", "unresolved_with", "says")
 
 
 def diagnose_log(log: Path, profile: Path, out: Path, more: Sequence[Path] = ()) -> Diagnosis:

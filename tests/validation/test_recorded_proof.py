@@ -157,6 +157,52 @@ def test_what_counts_is_the_difference() -> None:
     assert "2 time_delay" in text
 
 
+def test_why_effects_of_twice_the_oracles_size_were_missed_stands_on_the_page() -> None:
+    weak = Truth("thruster_gain", "port", {"factor": 0.8})
+    doubt = "It is estimated, not confirmed: on no axis does it remove 10 % of the error."
+    hint = finding("thruster_gain", {"factor": 0.82}, 0.05, "port", p=0.5, says=f"Port gives 82 %. {doubt}")
+    seen, own = {"size": 0.2, "oracle_size": 0.1, "distinct_size": 0.05}, finding("time_delay", p=0.5)
+    notes = (
+        "The profile has no hull model, or one of unknown spread: take them as hints.",
+        "Thruster force (port) is a hint: it makes the error in yaw 27 % larger.",
+        "Thruster force (port) and Payload were considered, but dropped: a law explains more.",
+        "Thruster force (starboard) is a hint: it is another one.",
+    )
+    told = case((weak,), [own], **seen)
+    results = [
+        plain([own]),
+        case((weak,), [hint, own, finding("waves", p=0.5), finding("unknown")], **seen),
+        replace(told, diagnosis=replace(told.diagnosis, notes=notes)),
+        replace(told, diagnosis=replace(told.diagnosis, notes=notes[:1])),
+        # Less than the oracle needs twice over, one that was named, and one of which no oracle's size is known.
+        case((weak,), [], **(seen | {"size": 0.19})),
+        case((weak,), [replace(hint, probability=1.0)], **seen),
+        case((weak,), []),
+    ]
+    scores = score_recorded(results, [])
+    assert [(one.of_oracle, one.of_distinct, one.outcome, one.instead) for one in scores.missed] == [
+        (2.0, 4.0, "a hint", ("waves, a hint", "unknown")),
+        (2.0, 4.0, "dropped", ()),
+        (2.0, 4.0, "none", ()),
+    ]
+    assert [one.why for one in scores.missed] == [
+        "on no axis does it remove 10 % of the error",
+        "it makes the error in yaw 27 % larger; dropped, as a law explains more",
+        "the profile has no hull model, and one log does not show how its hull moves",
+    ]
+    assert type(scores).from_json(scores.to_json()).missed == scores.missed
+    result = {
+        "settings": {"real": "list.toml", "runs": 1.0, "only": []},
+        "seed": 7,
+        "counts": {"refused": 0, "crashed": 0, "diagnosed": 6},
+        "commitment": "0" * 64,
+    }
+    text = page(result, scores)
+    assert "Of these 3, 0 are below twice the distinct size." in " ".join(text.split())
+    row = "| a | 2.0 | 4.0 | a hint: on no axis does it remove 10 % of the error | waves, a hint; unknown |"
+    assert f"| thruster_gain (port) {row}" in text
+
+
 def test_a_hint_that_the_recording_has_already_is_not_noticed() -> None:
     hint = finding("lever_arm", p=0.4)
     scores = score_recorded([plain([hint]), case((ARM,), [hint])], [])

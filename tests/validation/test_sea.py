@@ -189,6 +189,7 @@ def test_a_campaigns_finding_is_that_of_the_log_of_middle_probability() -> None:
     def one(probability: float, north: float) -> dict[str, Any]:
         found = {"effect": "wind", "instance": None, "probability": probability, "parameters": {"north": north}}
         more = {"improvement": {}, "unresolved_with": [], "rivals": [], "where": {"onset": None, "offset": None}}
+        more |= {"says": "The wind blew."}
         return {"findings": [found | more], "notes": []}
 
     (found,) = _campaign([one(0.9, 1.0), one(0.99, 2.0), one(0.95, 3.0)])["findings"]
@@ -229,6 +230,7 @@ def test_campaigns_are_scored_apart_from_what_an_oracle_sees_twice_on() -> None:
     assert (sea.winds_from_twice.count, sea.winds_from_twice.of) == (2, 2)
     assert (sea.false.count, sea.false.of) == (1, 4)
     assert [one.wrong for one in sea.campaigns] == [(), (), (), ("mooring",)]
+    assert [one.missed for one in sea.campaigns] == ["", "the wind of the day alone was named", "none", ""]
     # The wind is held against that of the log that the finding is of.
     (of_wind,) = [one for one in sea.recoveries if one.effect == "wind"]
     assert of_wind.errors == pytest.approx((0.0, 0.0))

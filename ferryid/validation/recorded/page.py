@@ -15,8 +15,10 @@ from ferryid.validation.recorded.case_sampling import MULTIPLES, NotMade
 from ferryid.validation.recorded.doses import RELATIVE_STEP, Doses, joined, pooled
 from ferryid.validation.recorded.effects import ACTUATOR, LOAD, SENSOR, concealments
 from ferryid.validation.recorded.scores import (
+    TWICE_DISTINCT,
     DoseResponse,
     Later,
+    Missed,
     Moved,
     Paired,
     RecordedScores,
@@ -69,6 +71,8 @@ def page(result: Mapping[str, Any], scores: RecordedScores) -> str:
         "responses": [_row(one) for one in scores.responses],
         "later": [_later(one) for one in scores.later],
         "moved": [_moved(one) for one in scores.moved],
+        "missed": [_missed(one) for one in scores.missed],
+        "below_distinct": sum(one.of_distinct < TWICE_DISTINCT for one in scores.missed),
         "pairs": [_pair(one) for one in scores.pairs],
         "gross": [
             (one.effect, one.recording, one.outcome, ", ".join(one.named) or "none", "yes" if one.noticed else "no")
@@ -115,6 +119,12 @@ def _pair(one: Paired) -> tuple[str, ...]:
         for named, noticed in zip(one.named, one.noticed, strict=True)
     ]
     return one.recording, *one.effects, *outcomes
+
+
+def _missed(one: Missed) -> tuple[str, ...]:
+    distinct = f"{one.of_distinct:.1f}" if one.of_distinct else ""
+    why = f"{one.outcome}: {one.why}" if one.why else one.outcome
+    return one.effect, one.recording, f"{one.of_oracle:.1f}", distinct, why, "; ".join(one.instead) or "nothing"
 
 
 def _moved(one: Moved) -> tuple[str, ...]:

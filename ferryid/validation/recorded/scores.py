@@ -12,7 +12,7 @@ from ferryid.json_record import Record
 from ferryid.validation.case import Case, Truth
 from ferryid.validation.detection_curves import Curve, curve
 from ferryid.validation.estimate_errors import EstimateErrors, estimate_errors
-from ferryid.validation.name_scores import HULL, Share, names, outcome_of_missed, wrong_names
+from ferryid.validation.name_scores import HULL, Share, names, outcome_of_missed, why_missed, wrong_names
 from ferryid.validation.recorded.case_sampling import NotMade
 from ferryid.validation.recorded.doses import Doses, joined
 from ferryid.validation.recorded.effects import Concealment, concealments
@@ -25,6 +25,8 @@ AT_TWICE = 0.9
 """Share of doses of twice the oracle's size that is to be named."""
 TWICE_DISTINCT = 2.0
 """Of the distinct size, from which on nine in ten ought to be named, too."""
+TWICE_SEEN = 2.0
+"""Of the oracle's size, from which on it is said why an effect was missed."""
 GROSS = "gross"
 """Kind of the cases whose record is wrong altogether."""
 MEDIAN_ERROR = 0.05
@@ -202,6 +204,32 @@ class Moved(Record):
 
 
 @dataclass(frozen=True)
+class Missed(Record):
+    """An effect of twice the oracle's size or more that was not named.
+
+    Attributes
+    ----------
+    effect, recording, size
+        Of the case, the effect with its thruster.
+    of_oracle, of_distinct
+        The size over the oracle's, and over the distinct one; 0: not known.
+    outcome, why
+        What became of it, and why, in the diagnosis's own words.
+    instead
+        Names and hints that the recording as it was has not.
+    """
+
+    effect: str
+    recording: str
+    size: float
+    of_oracle: float
+    of_distinct: float
+    outcome: str
+    why: str
+    instead: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class RecordedScores(Record):
     """All figures of merit.
 
@@ -235,6 +263,8 @@ class RecordedScores(Record):
         Of records that are wrong altogether; they enter `wrong` and none of the other shares.
     rivals
         The diagnosis beside other methods, on the cases on which these were run.
+    missed
+        Effects of twice the oracle's size or more that were not named.
     """
 
     runs: int
@@ -254,6 +284,7 @@ class RecordedScores(Record):
     pairs: tuple[Paired, ...] = ()
     gross: tuple[Gross, ...] = ()
     rivals: tuple[RivalScores, ...] = ()
+    missed: tuple[Missed, ...] = ()
 
 
 def score_recorded(
@@ -296,6 +327,7 @@ def score_recorded(
         tuple(_paired(one, plain[one.case.path]) for one in fresh if one.case.kind == "pair"),
         tuple(_gross(one) for one in broken),
         rival_scores([one for one in results if one.case.kind != GROSS], _beside_plain, concealments()),
+        tuple(_missed(one, plain[one.case.path]) for one in fresh if one.case.kind == "single" and _is_missed(one)),
     )
 
 
@@ -444,6 +476,28 @@ def _response(effect: str, recording: str, results: Sequence[CaseResult], plain:
         dict(lost.most_common()),
         tuple(one.case.oracle_size for one in fresh),
         tuple(one.case.distinct_size for one in fresh),
+    )
+
+
+def _is_missed(result: CaseResult) -> bool:
+    case = result.case
+    large = 0.0 < TWICE_SEEN * case.oracle_size <= case.size
+    return large and case.truths[0].key not in names(result)
+
+
+def _missed(result: CaseResult, plain: CaseResult) -> Missed:
+    case, key = result.case, result.truths[0].key
+    before = {one.key for one in plain.diagnosis.findings}
+    new = [one for one in result.diagnosis.findings if one.key not in before and one.key != key]
+    return Missed(
+        label(key),
+        case.path,
+        case.size,
+        case.size / case.oracle_size,
+        case.size / case.distinct_size if case.distinct_size else 0.0,
+        outcome_of_missed(difference(result, plain), key),
+        why_missed(result, key),
+        tuple(dict.fromkeys(label(one.key) if not one.hint else f"{label(one.key)}, a hint" for one in new)),
     )
 
 
