@@ -61,6 +61,15 @@ def test_a_model_comes_back_to_the_last_digit(tmp_path: Path) -> None:
     assert model_to_json(again) == model_to_json(stored.model)
 
 
+def test_what_nobody_could_read_again_is_not_stored(tmp_path: Path) -> None:
+    theta = made().theta
+    theta[0, 0] = np.inf
+    with pytest.raises(FerryIdError, match="missing or wrong.*The model is not stored.*Fix: report it"):
+        save(replace(made(), theta=theta), tmp_path)
+    assert not list(tmp_path.rglob("*.json"))
+    assert not list(tmp_path.rglob("current"))
+
+
 @pytest.mark.slow
 def test_current_moves_only_on_acceptance(tmp_path: Path) -> None:
     assert save(made(), tmp_path).current

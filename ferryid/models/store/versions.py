@@ -89,11 +89,25 @@ def plan(model: Model, out: Path) -> StoredModel:
 
 
 def save(model: Model, out: Path) -> StoredModel:
-    """Store a model under its next version; an accepted one becomes current."""
+    """Store a model under its next version; an accepted one becomes current.
+
+    Raises
+    ------
+    FerryIdError
+        For a model that could not be read again; nothing is written then.
+    """
     model = assign_version(model, out)
     stored = plan(model, out)
     if not stored.path.exists():
-        write_text(stored.path, dump_json(model_to_json(model)))
+        text = dump_json(model_to_json(model))
+        try:
+            model_from_json(json.loads(text), str(stored.path))
+        except FerryIdError as error:
+            raise FerryIdError(
+                f"{str(error).partition(' Fix: ')[0]} The model is not stored, as nobody could read it: this is a bug. "
+                "Fix: report it with the logs"
+            ) from error
+        write_text(stored.path, text)
     if model.accepted:
         action = "diagnose" if model.diagnosed else "fit"
         make_current(stored.path.parent, stored.previous, model.version, action, "It was accepted.")
