@@ -117,7 +117,7 @@ proof-sea: $(VENV)/installed
 
 # Conceals effects in real recordings, where they are present, and diagnoses them blind: writes reports/proof-real.json and
 # figures, and with the stored results of proof the page reports/proof.md. SEED=N and RUNS=N as for the proof.
-proof-real: SEED ?= 20271103
+proof-real: SEED ?= 20271128
 proof-real: RUNS ?= 1
 proof-real: $(VENV)/installed
 	$(BIN)/ferryid prove --real tests/real/recordings.toml --seed $(SEED) --runs $(RUNS) --processes 1 --out $(DEMO) \

@@ -64,7 +64,7 @@ def test_a_model_comes_back_to_the_last_digit(tmp_path: Path) -> None:
 def test_what_nobody_could_read_again_is_not_stored(tmp_path: Path) -> None:
     theta = made().theta
     theta[0, 0] = np.inf
-    with pytest.raises(FerryIdError, match="missing or wrong.*The model is not stored.*Fix: report it"):
+    with pytest.raises(FerryIdError, match=r"missing or wrong.*The model is not stored.*Fix: report it"):
         save(replace(made(), theta=theta), tmp_path)
     assert not list(tmp_path.rglob("*.json"))
     assert not list(tmp_path.rglob("current"))
