@@ -12,7 +12,7 @@ import pytest
 
 from tests.bench import __main__ as bench
 from tests.bench import campaigns, commands, diagnosis, ingest, sampled, trials, yardstick
-from tests.bench.page import Curve, Row, Section, Timed
+from tests.bench.page import Curve, Row, Section, Timed, page
 from tests.bench.processes import Sampled
 
 ROWS: list[Row | Timed] = [
@@ -75,6 +75,17 @@ def test_the_page_says_how_other_work_compares_with_the_yardstick() -> None:
     assert "| ikpls, 7.2 million rows | 1.7 s | 6.8 s | 4 |" in said
     assert "0.5 (bare Python, whole process) to 4 (ikpls, 7.2 million rows)" in said
     assert "easier to reach than it was there for work of the first kind, and harder to reach than it was there" in said
+
+
+@pytest.mark.parametrize(("took_s", "judged"), [(1700.0, "reached"), (1900.0, "**missed**")])
+def test_the_time_of_the_page_is_judged_by_the_yardstick_too(took_s: float, judged: str) -> None:
+    parts = [
+        Section("A", [], took_s=took_s - 100.0, yardstick_s=[2 * yardstick.GOALS_S]),
+        Section("B", [], took_s=100.0),
+    ]
+    said = page(parts, quick=False)
+    assert f"The goal is 661 times, 15 minutes on the machine of the goals: {judged}." in said
+    assert f"{took_s / 60:.1f} minutes, {took_s / (2 * yardstick.GOALS_S):.0f} times the yardstick." in said
 
 
 def test_memory_of_a_campaign_has_a_goal_of_its_own() -> None:
