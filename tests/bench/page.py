@@ -21,7 +21,6 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from ferryid.report.figures import BASE, MEASURED, NEW, STYLE, svg_text
 from tests.bench import yardstick
 
-
 PAGE_GOAL_S = 900.0
 """Time within which the page is to be made [s]."""
 
