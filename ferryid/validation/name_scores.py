@@ -175,9 +175,9 @@ def why_missed(result: CaseResult, key: Key) -> str:
             reasons.append(why.removesuffix("."))
         what, found, why = note.partition(" considered, but dropped: ")
         if found and title.lower() in what.lower():
-            reasons.append(f"dropped, as {why.removesuffix('.')}")
+            reasons.append(why.removesuffix("."))
     if not any(reasons) and any(note.startswith(NO_HULL_MODEL) for note in result.diagnosis.notes):
-        reasons.append("the profile has no hull model, and one log does not show how its hull moves")
+        reasons.append("the hull was fitted to the same log, as the profile has none")
     return "; ".join(dict.fromkeys(filter(None, reasons)))
 
 

@@ -187,8 +187,8 @@ def test_why_effects_of_twice_the_oracles_size_were_missed_stands_on_the_page() 
     ]
     assert [one.why for one in scores.missed] == [
         "on no axis does it remove 10 % of the error",
-        "it makes the error in yaw 27 % larger; dropped, as a law explains more",
-        "the profile has no hull model, and one log does not show how its hull moves",
+        "it makes the error in yaw 27 % larger; a law explains more",
+        "the hull was fitted to the same log, as the profile has none",
     ]
     assert type(scores).from_json(scores.to_json()).missed == scores.missed
     result = {
