@@ -203,7 +203,7 @@ class IdentifyThresholds:
     most_kept: float = threshold(
         0.9,
         "of the last step",
-        "most that a step of expectation and maximisation is believed to keep of the one before",
+        "largest ratio of one step of expectation and maximisation to the one before by which steps are extrapolated",
         "convention: no more than nine steps are taken at once",
     )
     settled_step: float = threshold(

@@ -144,7 +144,7 @@ NO_DECISION = {
         effects.shallow_water CELLS
         effects.wind SPEEDS_MPS BEARINGS MEAN_GUSTS MEAN_WEIGHTS
         identify.feasible _ROUNDS _SHARES _DIRECTIONS _TIE_STEPS
-        identify.log_conditions _DIRECTIONS _SPEEDS _STEP_MPS
+        identify.log_conditions _DIRECTIONS _SPEEDS
         identify.condition_estimation STEPS _FIRST_STEADY
         identify.condition_kinds _STEP
         identify.settings WINDOWS_S
