@@ -96,6 +96,12 @@ def test_from_the_recording_to_the_page(tmp_path: Path, monkeypatch: pytest.Monk
         validated(out, zigzag(tmp_path / "zigzag.dat", 241.0))
 
 
+RUN: dict[str, Any] = {
+    "settings": {"real": "list.toml", "runs": 1.0, "only": []},
+    "seed": 7,
+    "counts": {"refused": 0, "crashed": 0, "diagnosed": 6},
+    "commitment": "0" * 64,
+}
 ARM = Truth("lever_arm", None, {"x": 1.0, "y": 0.0})
 
 
@@ -140,13 +146,7 @@ def test_what_counts_is_the_difference() -> None:
     assert scores.recoveries[0].covered.value == 1.0
     (errors,) = [one for one in recorded_targets(scores) if one.what.startswith("median")]
     assert errors.reached is False
-    result = {
-        "settings": {"real": "list.toml", "runs": 1.0, "only": []},
-        "seed": 7,
-        "counts": {"refused": 0, "crashed": 0, "diagnosed": 6},
-        "commitment": "0" * 64,
-    }
-    text = page(result, scores)
+    text = page(RUN, scores)
     assert "| a | boat | explained | 2 | time_delay | mooring |" in text
     assert (
         "- a: wind (no areas); payload of 0.3 and 0.5 share of the mass (more than 2 % of the rows cannot express it, as so)."
@@ -191,13 +191,7 @@ def test_why_effects_of_twice_the_oracles_size_were_missed_stands_on_the_page() 
         "the hull was fitted to the same log, as the profile has none",
     ]
     assert type(scores).from_json(scores.to_json()).missed == scores.missed
-    result = {
-        "settings": {"real": "list.toml", "runs": 1.0, "only": []},
-        "seed": 7,
-        "counts": {"refused": 0, "crashed": 0, "diagnosed": 6},
-        "commitment": "0" * 64,
-    }
-    text = page(result, scores)
+    text = page(RUN, scores)
     assert "Of these 3, 0 are below twice the distinct size." in " ".join(text.split())
     row = "| a | 2.0 | 4.0 | a hint: on no axis does it remove 10 % of the error | waves, a hint; unknown |"
     assert f"| thruster_gain (port) {row}" in text
@@ -309,13 +303,7 @@ def test_doses_are_counted_by_the_distinct_size() -> None:
     assert (share.count, share.of) == (1, 2)
     (target,) = [one for one in recorded_targets(scores) if "twice the distinct size" in one.what]
     assert "50.0 % (1/2)" in target.what
-    result = {
-        "settings": {"real": "list.toml", "runs": 1.0, "only": []},
-        "seed": 7,
-        "counts": {"refused": 0, "crashed": 0, "diagnosed": 5},
-        "commitment": "0" * 64,
-    }
-    text = " ".join(page(result, scores).split())
+    text = " ".join(page(RUN, scores).split())
     assert "Named from twice the distinct size on: 50.0 % (1/2)" in text
     assert "(sensors 1/2)" in text
     # Answers of a run before there was one lack it.
