@@ -22,6 +22,8 @@ LEVEL = 0.95
 HULL = "hull_parameters"
 NOT_CONFIRMED, NO_HULL_MODEL = "not confirmed: ", "The profile has no hull model"
 """How a finding of a campaign says why it is a hint, and how the note begins that makes findings of a single log hints."""
+IS_A_HINT, DROPPED = " is a hint: ", " considered, but dropped: "
+"""What stands in a note between an effect and why it is a hint, or is none."""
 
 
 @dataclass(frozen=True)
@@ -165,18 +167,17 @@ def why_missed(result: CaseResult, key: Key) -> str:
     """Return why an effect that is in the log of a case was not named, in the diagnosis's words; empty where it has none."""
     effect = effects().get(key[0])
     title = key[0] if effect is None else titled(effect.title, key[1])
-    reasons = []
-    for one in result.diagnosis.findings:
-        if one.key == key and one.hint:
-            reasons.append(one.says.partition(NOT_CONFIRMED)[2].strip(" .:"))
+    hints = [one for one in result.diagnosis.findings if one.key == key and one.hint]
+    reasons = [one.says.partition(NOT_CONFIRMED)[2].strip(" .:") for one in hints]
     for note in result.diagnosis.notes:
-        what, found, why = note.partition(" is a hint: ")
+        what, found, why = note.partition(IS_A_HINT)
         if found and what.lower() == title.lower():
             reasons.append(why.removesuffix("."))
-        what, found, why = note.partition(" considered, but dropped: ")
+        what, found, why = note.partition(DROPPED)
         if found and title.lower() in what.lower():
             reasons.append(why.removesuffix("."))
-    if not any(reasons) and any(note.startswith(NO_HULL_MODEL) for note in result.diagnosis.notes):
+    # This makes hints of findings; why there is none at all, or something without a name, it does not say.
+    if hints and not any(reasons) and any(note.startswith(NO_HULL_MODEL) for note in result.diagnosis.notes):
         reasons.append("the hull was fitted to the same log, as the profile has none")
     return "; ".join(dict.fromkeys(filter(None, reasons)))
 

@@ -11,10 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ferryid.diagnose import judging
 from ferryid.errors import FerryIdError
 from ferryid.validation import stages
 from ferryid.validation.case import Case, Truth
 from ferryid.validation.commitment import verified_answers
+from ferryid.validation.name_scores import DROPPED, IS_A_HINT, NO_HULL_MODEL, NOT_CONFIRMED
 from ferryid.validation.recorded.case_sampling import NotMade
 from ferryid.validation.recorded.evaluators import recorded_pipeline
 from ferryid.validation.recorded.log import read_log
@@ -168,12 +170,13 @@ def test_why_effects_of_twice_the_oracles_size_were_missed_stands_on_the_page() 
         "Thruster force (port) and Payload were considered, but dropped: a law explains more.",
         "Thruster force (starboard) is a hint: it is another one.",
     )
-    told = case((weak,), [own], **seen)
+    told, last = case((weak,), [own], **seen), case((weak,), [replace(hint, says="")], **seen)
     results = [
         plain([own]),
         case((weak,), [hint, own, finding("waves", p=0.5), finding("unknown")], **seen),
         replace(told, diagnosis=replace(told.diagnosis, notes=notes)),
         replace(told, diagnosis=replace(told.diagnosis, notes=notes[:1])),
+        replace(last, diagnosis=replace(last.diagnosis, notes=notes[:1])),
         # Less than the oracle needs twice over, one that was named, and one of which no oracle's size is known.
         case((weak,), [], **(seen | {"size": 0.19})),
         case((weak,), [replace(hint, probability=1.0)], **seen),
@@ -184,17 +187,26 @@ def test_why_effects_of_twice_the_oracles_size_were_missed_stands_on_the_page() 
         (2.0, 4.0, "a hint", ("waves, a hint", "unknown")),
         (2.0, 4.0, "dropped", ()),
         (2.0, 4.0, "none", ()),
+        (2.0, 4.0, "a hint", ()),
     ]
     assert [one.why for one in scores.missed] == [
         "on no axis does it remove 10 % of the error",
         "it makes the error in yaw 27 % larger; a law explains more",
+        # The note says why findings are hints, not why there is none.
+        "",
         "the hull was fitted to the same log, as the profile has none",
     ]
     assert type(scores).from_json(scores.to_json()).missed == scores.missed
     text = page(RUN, scores)
-    assert "Of these 3, 0 are below twice the distinct size." in " ".join(text.split())
+    assert "Of these 4, 0 are below twice the distinct size." in " ".join(text.split())
     row = "| a | 2.0 | 4.0 | a hint: on no axis does it remove 10 % of the error | waves, a hint; unknown |"
     assert f"| thruster_gain (port) {row}" in text
+
+
+@pytest.mark.parametrize("words", [NOT_CONFIRMED, NO_HULL_MODEL, IS_A_HINT, DROPPED])
+def test_reasons_are_found_by_words_that_the_diagnosis_has(words: str) -> None:
+    sources = Path(judging.__file__).parent.glob("*.py")
+    assert any(words in one.read_text("utf-8") for one in sources)
 
 
 def test_a_hint_that_the_recording_has_already_is_not_noticed() -> None:
