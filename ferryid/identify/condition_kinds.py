@@ -14,9 +14,9 @@ import numpy as np
 
 from ferryid.cached import cached_property
 from ferryid.effects import effects
-from ferryid.identify.log_conditions import BlownLoad
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.weak_rows import WeakRows
+from ferryid.identify.window_loads import BlownLoad
 from ferryid.models import CONDITION_TITLES
 from ferryid.models.forces import ACCELERATIONS, motion_force
 from ferryid.regression import window_rows, window_weights

@@ -8,13 +8,13 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from ferryid.identify.excitation import SECTORS, heading_sectors
-from ferryid.identify.log_conditions import LoadSamples, sample_load
 from ferryid.identify.log_sums import moments_of
 from ferryid.identify.rows import known_rows
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.split import block_number, purge_seconds, split_rows
 from ferryid.identify.weak_data import every_second
 from ferryid.identify.weak_rows import WeakRows, average_over_windows
+from ferryid.identify.window_loads import LoadSamples, sample_load
 from ferryid.models import payload_kg, validity_ranges
 from ferryid.models.forces import compute_residual
 from ferryid.regression import window_rows

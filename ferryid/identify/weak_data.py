@@ -21,7 +21,7 @@ from ferryid.identify.feasible import Feasible, LiftTie, feasible_gains
 from ferryid.identify.fit_data import Estimate
 from ferryid.identify.inertia import relative_inertia, without_inertia
 from ferryid.identify.log_condition import KindOutcome, LogCondition, conditions_json
-from ferryid.identify.log_conditions import Conditions, LoadSamples, Start, estimate_conditions, sample_load
+from ferryid.identify.log_conditions import Conditions, Start, estimate_conditions
 from ferryid.identify.motion_data import LogData
 from ferryid.identify.outcome import Excitation, LogWind
 from ferryid.identify.prediction_windows import PredictionWindows
@@ -29,6 +29,7 @@ from ferryid.identify.settings import FOLDS
 from ferryid.identify.split import Split
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.weak_rows import WeakRows, to_force
+from ferryid.identify.window_loads import LoadSamples, sample_load
 from ferryid.models.forces import ACCELERATIONS, MAPPED, without_sway_coupling
 from ferryid.regression import STRIDES, CrossProducts, QrFactor, Rows, Simpls, fit_simpls
 from ferryid.regression.cross_validation import Folds

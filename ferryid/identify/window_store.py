@@ -11,11 +11,11 @@ import numpy as np
 from ferryid.errors import FerryIdError
 from ferryid.files import remove_abandoned, replacing
 from ferryid.identify.block_sum_store import key_of, path_of
-from ferryid.identify.log_conditions import LoadSamples, sample_weights
 from ferryid.identify.log_windows import LogWindows, WindowPart, average_log
 from ferryid.identify.rows import basis_for
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.weak_rows import WeakRows
+from ferryid.identify.window_loads import LoadSamples, sample_weights
 from ferryid.signals.cache import folder_of, load
 from ferryid.signals.parquet import read_table, write_table
 from ferryid.signals.prepare import smoothed, track_of

@@ -17,11 +17,11 @@ import numpy as np
 
 from ferryid.identify import block_sum_store, window_store
 from ferryid.identify.block_sum_store import StoredSums, load_block_sums
-from ferryid.identify.log_conditions import LoadSamples
 from ferryid.identify.log_windows import LogWindows
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.weak_rows import WeakRows
 from ferryid.identify.window_length import TRAINING_LENGTHS
+from ferryid.identify.window_loads import LoadSamples
 from ferryid.regression.bases.basis import make_basis
 from ferryid.regression.cross_products import CrossProducts
 from ferryid.regression.cross_validation.block_sums import BlockSums

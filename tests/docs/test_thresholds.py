@@ -186,7 +186,8 @@ NO_DECISION = {
         identify.sign_changes MOST_NAMED
         identify.gusts _PROBES MANY_WINDOWS
         identify.weak_archive _AT_A_TIME
-        identify.log_conditions _SAMPLES _START_WINDOWS
+        identify.log_conditions _START_WINDOWS
+        identify.window_loads _SAMPLES
         identify.condition_choice _GROUPS
         identify.condition_kinds _POINTS
         identify.condition_problem BLOCKS STEADY

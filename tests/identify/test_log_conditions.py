@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from ferryid.identify import log_conditions
 from ferryid.identify.estimation import estimate_correction
 from ferryid.identify.gusts import Gusts
-from ferryid.identify.log_conditions import Conditions, Load, LoadSamples
+from ferryid.identify.log_conditions import Conditions
 from ferryid.identify.outcome import LogWind
 from ferryid.identify.some_logs import some_logs
 from ferryid.identify.split import Split
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.weak_data import WeakData
+from ferryid.identify.window_loads import Load, LoadSamples
 from ferryid.models.forces import Estimator, effective_mass
 from ferryid.signals.track import Motion
 from ferryid.types import no_progress
