@@ -257,15 +257,15 @@ def between(read: Callable[[], object]) -> str:
     return f"processor time by steps, over {os.cpu_count()} cores: {', '.join(parts)}, the rest {duration(rest_s)}"
 
 
-def against_whole_camera_log(folder: Path, minutes: float) -> tuple[list[Row], str]:
+def against_whole_camera_log(folder: Path, minutes: float) -> tuple[list[Row], list[str]]:
     """A log that is nearly all pictures: reading the signals, against reading or decompressing everything.
 
     Returns
     -------
     tuple
-        The rows, and where the time of the first of them goes.
+        The rows, and where the time of each goes.
     """
-    rows, note = [], ""
+    rows, notes = [], []
     for kind, compression in CAMERA:
         log = logs.log(folder, kind, compression, minutes, camera=True)
         what = f"{minutes:g} min {NAMES[kind]} {compression} with camera: read"
@@ -273,10 +273,10 @@ def against_whole_camera_log(folder: Path, minutes: float) -> tuple[list[Row], s
         if compression == "none":
             file = next(log.glob("*.db3")) if log.is_dir() else log
             rows.append(faster(what, partial(columns, log), "cat", partial(cat, file), 1.0, 5))
-            note = note or f"{what}: {between(partial(columns, log))}."
         else:
             rows.append(faster(what, lambda log=log: columns(log), "decompress all", decompress(log), 4.0, 3))
-    return rows, note
+        notes.append(f"{what}: {between(partial(columns, log))}.")
+    return rows, notes
 
 
 def cat(file: Path) -> None:
@@ -409,7 +409,7 @@ def run(quick: bool, folder: Path | None = None) -> Section:
             ],
         )
     rows, between_notes, zstd_s = read_and_write(folder, short, long)
-    with_camera, camera_note = against_whole_camera_log(folder, camera)
+    with_camera, camera_notes = against_whole_camera_log(folder, camera)
     by_rerun, rerun_notes = against_rerun(folder, short)
     processes, process_notes = as_process(folder, short, 1 if quick else 3)
     rows += [*with_camera, *by_rerun, *processes, *memory(folder, short)]
@@ -423,7 +423,7 @@ def run(quick: bool, folder: Path | None = None) -> Section:
             "writes the same fields. `ferryid ingest` also hashes the log, in a thread beside; so do the whole processes. "
             f"The rival is timed on the log of {short:g} min of each format in the same rounds, and multiplied for {long:g}.",
             *between_notes,
-            camera_note,
+            *camera_notes,
             *rerun_notes,
             *process_notes,
             f"Logs with camera hold raw 1280 x 720 pictures at {logs.CAMERA_HZ:g} Hz, {camera:g} minutes, about "

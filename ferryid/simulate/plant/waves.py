@@ -189,6 +189,26 @@ def amplitudes(number: Floats, amplitude: Floats, direction: Floats, box: tuple[
 
 
 @borrowing
+def sine_cosine(turns: float) -> tuple[float, float]:
+    """Return sine and cosine of an angle in turns, to a few units of the last place of 1.
+
+    Taylor series of half the angle, at most a quarter turn: of forty components, the library's functions took four fifths of a
+    trial's time. Factors are those between neighbouring terms.
+    """
+    p = pi * (turns - np.rint(turns))
+    q = p * p
+    s = 1.0 - q * (1.0 / 272.0) * (1.0 - q * (1.0 / 342.0) * (1.0 - q * (1.0 / 420.0)))
+    s = 1.0 - q * (1.0 / 110.0) * (1.0 - q * (1.0 / 156.0) * (1.0 - q * (1.0 / 210.0) * s))
+    s = 1.0 - q * (1.0 / 20.0) * (1.0 - q * (1.0 / 42.0) * (1.0 - q * (1.0 / 72.0) * s))
+    s = p * (1.0 - q * (1.0 / 6.0) * s)
+    c = 1.0 - q * (1.0 / 306.0) * (1.0 - q * (1.0 / 380.0) * (1.0 - q * (1.0 / 462.0)))
+    c = 1.0 - q * (1.0 / 132.0) * (1.0 - q * (1.0 / 182.0) * (1.0 - q * (1.0 / 240.0) * c))
+    c = 1.0 - q * (1.0 / 30.0) * (1.0 - q * (1.0 / 56.0) * (1.0 - q * (1.0 / 90.0) * c))
+    c = 1.0 - q * 0.5 * (1.0 - q * (1.0 / 12.0) * c)
+    return 2.0 * s * c, 1.0 - 2.0 * s * s
+
+
+@borrowing
 def first_order(sea: Sea, t: float, x: float, y: float, psi: float) -> Force:
     """Return the first-order force [N, N, N·m] at a time [s] on a vessel at a place [m] and heading [rad]."""
     count = len(sea.frequency)
@@ -200,9 +220,11 @@ def first_order(sea: Sea, t: float, x: float, y: float, psi: float) -> Force:
     node = int(node) % HEADINGS
     low, high = sea.table[node], sea.table[node + 1]
     frequency, north, east, phase, terms = sea.frequency, sea.north, sea.east, sea.phase, sea.terms
+    # A loop of its own, without branches or calls, so that several components are computed at once.
     for j in range(count):
-        turns = frequency[j] * t - north[j] * x - east[j] * y + phase[j]
-        sine, cosine = sin(2.0 * pi * turns), cos(2.0 * pi * turns)
+        terms[0, j], terms[1, j] = sine_cosine(frequency[j] * t - north[j] * x - east[j] * y + phase[j])
+    for j in range(count):
+        sine, cosine = terms[0, j], terms[1, j]
         terms[0, j] = (low[0, j] + share * (high[0, j] - low[0, j])) * sine
         terms[1, j] = (low[1, j] + share * (high[1, j] - low[1, j])) * sine
         terms[2, j] = (low[2, j] + share * (high[2, j] - low[2, j])) * cosine

@@ -15,7 +15,7 @@ from scipy.integrate import quad, solve_ivp
 from ferryid.errors import FerryIdError
 from ferryid.simulate.plant.rolling import natural_frequency, roll_pitch, swing
 from ferryid.simulate.plant.spectrum import components, equal_shares
-from ferryid.simulate.plant.waves import first_order, lever, sea_of, sinc, slopes
+from ferryid.simulate.plant.waves import first_order, lever, sea_of, sinc, sine_cosine, slopes
 from ferryid.simulate.sections import Wake, Waves
 from ferryid.vessel.load import load_profile
 
@@ -38,6 +38,16 @@ def test_frequencies_part_the_energy_evenly(gamma):
     for j, edge in enumerate(edges):
         below = quad(density, 0.4, edge, (gamma,), points=(min(1.0, edge),), limit=400)[0]
         assert below / whole == pytest.approx(j / 8, abs=2e-5)
+
+
+def test_sine_and_cosine_against_twenty_digits():
+    turns = np.concatenate([np.linspace(-0.5, 0.5, 1001), np.linspace(-40.0, 40.0, 1001)])
+    got = np.array([sine_cosine(turn) for turn in turns])
+    with mpmath.workdps(20):
+        # The nearest whole turn is taken off exactly: the angle itself is not rounded.
+        want = np.array([(float(mpmath.sinpi(2 * turn)), float(mpmath.cospi(2 * turn))) for turn in map(mpmath.mpf, turns)])
+    assert np.abs(got - want).max() < 2e-15
+    assert sine_cosine(0.25) == pytest.approx((1.0, 0.0), abs=1e-15)
 
 
 def test_pierson_moskowitz_by_hand():
