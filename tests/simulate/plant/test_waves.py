@@ -45,7 +45,9 @@ def test_sine_and_cosine_against_twenty_digits():
     got = np.array([sine_cosine(turn) for turn in turns])
     with mpmath.workdps(20):
         # The nearest whole turn is taken off exactly: the angle itself is not rounded.
-        want = np.array([(float(mpmath.sinpi(2 * turn)), float(mpmath.cospi(2 * turn))) for turn in map(mpmath.mpf, turns)])
+        want = np.array(
+            [(float(mpmath.sinpi(2 * turn)), float(mpmath.cospi(2 * turn))) for turn in map(mpmath.mpf, turns)]
+        )
     assert np.abs(got - want).max() < 2e-15
     assert sine_cosine(0.25) == pytest.approx((1.0, 0.0), abs=1e-15)
 
