@@ -47,8 +47,14 @@ def weak_evidence(evidence: float, least: float) -> str:
     return f"the logs hardly show it: log evidence {evidence:.1f} nat over none, {least:g} are needed"
 
 
+ALL_THRUSTERS = "all"
+"""Instance of a change of force that all actuators have in common, as by a weak battery."""
+
+
 def titled(title: str, instance: str | None) -> str:
-    """Return a title with the thruster it is one of, if it is."""
+    """Return a title with the thruster it is one of, if it is, or that it is of all of them."""
+    if instance == ALL_THRUSTERS:
+        return f"{title} (all actuators alike)"
     return f"{title} ({instance})" if instance else title
 
 

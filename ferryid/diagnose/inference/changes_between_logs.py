@@ -23,7 +23,6 @@ from ferryid.diagnose.inference.campaign_model import Campaign
 from ferryid.diagnose.inference.campaign_properties import LOADS
 from ferryid.diagnose.inference.candidate import Candidate
 from ferryid.diagnose.inference.group_differences import (
-    ALL_THRUSTERS,
     FAULTS,
     GROUPS,
     Contender,
@@ -33,6 +32,7 @@ from ferryid.diagnose.inference.group_differences import (
     likeliest_difference,
 )
 from ferryid.diagnose.inference.thresholds import INFERENCE
+from ferryid.effects.wording import ALL_THRUSTERS
 
 
 @dataclass(frozen=True)

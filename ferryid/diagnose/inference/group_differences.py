@@ -40,6 +40,7 @@ from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.effects import effects
 from ferryid.effects.effect import Effect, Parameter
 from ferryid.effects.force_model import ForceModel
+from ferryid.effects.wording import ALL_THRUSTERS
 from ferryid.side_by_side import over
 from ferryid.types import Flags, Floats
 
@@ -49,8 +50,6 @@ OF_HULL = frozenset({"fouling"})
 """What a single log shows beside a hull model alone, and groups beside the hull that they share."""
 FAULTS = frozenset({"thruster_gain"})
 """Factors of force. One of the groups has less than the other: a loss in the one, as no actuator gains force of itself."""
-ALL_THRUSTERS = "all"
-"""Instance of a change of force that all actuators have in common, as by a weak battery."""
 SCATTERS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6)
 """Standard deviations between logs that are averaged over beside none, in sizes of a parameter."""
 

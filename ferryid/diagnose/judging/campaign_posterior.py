@@ -14,10 +14,11 @@ import numpy as np
 
 from ferryid.diagnose.data.measurements import Survey
 from ferryid.diagnose.inference.estimation import Candidate
-from ferryid.diagnose.inference.group_differences import ALL_THRUSTERS, GROUPS
+from ferryid.diagnose.inference.group_differences import GROUPS
 from ferryid.diagnose.judging.campaign import JudgedCampaign
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.posterior import Posterior, stored_effect, trained
+from ferryid.effects.wording import ALL_THRUSTERS
 from ferryid.models import Source, StoredEffect
 from ferryid.types import Floats
 

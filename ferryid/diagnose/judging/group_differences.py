@@ -16,7 +16,6 @@ from ferryid.diagnose.inference.campaign_model import Campaign
 from ferryid.diagnose.inference.campaign_properties import without_property
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.group_differences import (
-    ALL_THRUSTERS,
     GROUPS,
     OF_HULL,
     Comparison,
@@ -118,8 +117,6 @@ class Difference:
     @property
     def title(self) -> str:
         """What differs."""
-        if self.candidate.instance == ALL_THRUSTERS:
-            return f"{self.candidate.effect.title} (all actuators alike)"
         return self.candidate.title
 
     def seen_from(self, name: str) -> str:

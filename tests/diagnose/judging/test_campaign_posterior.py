@@ -16,12 +16,13 @@ from ferryid.diagnose.inference.campaign import CommonHull
 from ferryid.diagnose.inference.campaign_estimation import estimate_campaign
 from ferryid.diagnose.inference.campaign_properties import with_property
 from ferryid.diagnose.inference.estimation import Candidate
-from ferryid.diagnose.inference.group_differences import ALL_THRUSTERS, differences_of, in_groups
+from ferryid.diagnose.inference.group_differences import differences_of, in_groups
 from ferryid.diagnose.judging.campaign import JudgedCampaign
 from ferryid.diagnose.judging.campaign_conditions import JudgedConditions
 from ferryid.diagnose.judging.campaign_posterior import campaign_posterior
 from ferryid.diagnose.judging.posterior import Posterior
 from ferryid.effects import effects
+from ferryid.effects.wording import ALL_THRUSTERS
 from ferryid.models import Quantity, Source, StoredEffect
 from tests.diagnose.inference.test_campaign_estimation import FERRY, WINDS, fitted
 from tests.diagnose.judging.findings import found

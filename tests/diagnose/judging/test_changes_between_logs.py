@@ -12,10 +12,10 @@ import pytest
 from ferryid.diagnose.data.measurements import window_lengths
 from ferryid.diagnose.inference.campaign_logs import Member
 from ferryid.diagnose.inference.campaign_model import INDUCED, Campaign, HullPrior
-from ferryid.diagnose.inference.group_differences import ALL_THRUSTERS
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.campaign import JudgedCampaign, judge_campaign
 from ferryid.effects.force_model import ForceModel, Measurements, hull_of
+from ferryid.effects.wording import ALL_THRUSTERS
 from ferryid.types import no_progress
 from ferryid.vessel.wind import wind_force
 from tests.diagnose.inference.test_campaign_estimation import FERRY, SPREAD

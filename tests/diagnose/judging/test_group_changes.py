@@ -17,7 +17,6 @@ from ferryid.diagnose.inference.campaign_logs import Member
 from ferryid.diagnose.inference.campaign_model import INDUCED, Campaign, HullPrior
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.group_differences import (
-    ALL_THRUSTERS,
     compare_near,
     differences_of,
     in_groups,
@@ -29,6 +28,7 @@ from ferryid.diagnose.versus import GroupLog, Versus, versus_json
 from ferryid.effects import effects
 from ferryid.effects.force_model import ForceModel, hull_of
 from ferryid.effects.fouling import SECOND_ORDER
+from ferryid.effects.wording import ALL_THRUSTERS
 from ferryid.report.versus_report import as_text, render
 from ferryid.types import no_progress
 from ferryid.vessel.hull import payload_mass
