@@ -33,6 +33,8 @@ LATER_BLOCKS = 8
 """Blocks of parts whose cross-products are taken from the rows since they began."""
 MOST_VALUES = 1e7
 """Numbers that a scan holds at once; parts are longer in long logs."""
+FINE_TIMES = 40
+"""About so many times, or fewer, are tried about either end of a promising span."""
 FIRST_TIME_STEP_S, LAST_TIME_STEP_S = 8.0, 0.2
 """Steps [s] with which a time is searched for nearby, from the first down to the last."""
 COMPARING_ITERATIONS = 3
@@ -95,7 +97,7 @@ def promising_spans(problem: EstimationProblem, linearisation: Linearisation, ca
     The log is cut into parts; what a candidate adds in a part is linear in its parameters there, and what it adds in a span is
     the sum of the parts'. So one set of cross-products holds the evidence of every span, hull and other effects refitted.
 
-    What only passes has to stand out: see `stands_out`.
+    What only passes has to stand out: see `stands_out`. Each span has its ends where it promises most nearby: see `_sharpened`.
     """
     edges, a, b, gain = _scan(problem, linearisation, candidate)
     parts = len(edges) - 1
@@ -109,10 +111,42 @@ def promising_spans(problem: EstimationProblem, linearisation: Linearisation, ca
             continue
         if not candidate.effect.passing or _is_event(float(gain[k]), a, b, gain, i, j):
             found.append((i, j))
-    return [
-        replace(candidate, onset_s=float(edges[i]) if i > 0 else 0.0, offset_s=float(edges[j]) if j < parts else inf)
-        for i, j in found
-    ]
+    return [_sharpened(problem, linearisation, candidate, edges, i, j) for i, j in found]
+
+
+def _sharpened(
+    problem: EstimationProblem, linearisation: Linearisation, candidate: Candidate, edges: Floats, i: int, j: int
+) -> Candidate:
+    """Return a candidate in the span from one edge to another, its ends where it promises most within a part of these.
+
+    Noise that swings gives the evidence a top every period: between two edges there are several, and a search that goes uphill
+    ends on the nearest.
+    """
+    last = len(edges) - 1
+    begins, ends = (_steps_about(problem, edges, k) for k in (i, j))
+    fine = np.unique(np.concatenate([edges[[0, last]], begins, ends]))
+    a, b = (np.searchsorted(fine, times) for times in (begins, ends))
+    a, b = (one.ravel() for one in np.meshgrid(a, b))
+    a, b = a[a < b], b[a < b]
+    if candidate.effect.passing:
+        lasts = fine[b] - fine[a]
+        allowed = (lasts >= shortest_s(problem, candidate)) & (lasts <= longest_s(problem, candidate))
+        a, b = a[allowed], b[allowed]
+    onset, offset = edges[i], edges[j]
+    if len(a):
+        G, g = _cross_products(problem, linearisation, candidate, fine)
+        best = int(np.argmax(_gains(G, g, a, b, candidate)))
+        onset, offset = fine[a[best]], fine[b[best]]
+    return replace(candidate, onset_s=float(onset) if i > 0 else 0.0, offset_s=float(offset) if j < last else inf)
+
+
+def _steps_about(problem: EstimationProblem, edges: Floats, k: int) -> Floats:
+    """Return the times of steps within a part of an edge, its own among them [s]; of either end of the log that alone."""
+    if k in (0, len(edges) - 1):
+        return edges[[k]]
+    times = problem.steps.middle_s
+    near = times[(times > edges[k - 1]) & (times < edges[k + 1])]
+    return np.unique(np.append(near[:: max(1, len(near) // FINE_TIMES)], edges[k]))
 
 
 def stands_out(problem: EstimationProblem, linearisation: Linearisation, candidate: Candidate) -> bool:
