@@ -100,7 +100,6 @@ def promising_spans(problem: EstimationProblem, linearisation: Linearisation, ca
     What only passes has to stand out: see `stands_out`. Each span has its ends where it promises most nearby: see `_sharpened`.
     """
     edges, a, b, gain = _scan(problem, linearisation, candidate)
-    parts = len(edges) - 1
     found: list[tuple[int, int]] = []
     for k in np.argsort(-gain).tolist():
         if gain[k] <= 0.0 or len(found) == INFERENCE.fitted_spans:
