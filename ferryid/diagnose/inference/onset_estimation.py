@@ -140,11 +140,14 @@ def _sharpened(
 
 
 def _steps_about(problem: EstimationProblem, edges: Floats, k: int) -> Floats:
-    """Return the times of steps within a part of an edge, its own among them [s]; of either end of the log that alone."""
+    """Return the times of steps within a part of an edge, its own among them [s]; of either end of the log that alone.
+
+    None is outside the middles of the windows, between which a time is estimated.
+    """
     if k in (0, len(edges) - 1):
         return edges[[k]]
-    times = problem.steps.middle_s
-    near = times[(times > edges[k - 1]) & (times < edges[k + 1])]
+    times, middles = problem.steps.middle_s, problem.windows.middle_s
+    near = times[(times > max(edges[k - 1], middles[0])) & (times < min(edges[k + 1], middles[-1]))]
     return np.unique(np.append(near[:: max(1, len(near) // FINE_TIMES)], edges[k]))
 
 

@@ -120,6 +120,17 @@ def test_where_nothing_pushes_no_span_is_promising() -> None:
 
 
 @pytest.mark.slow
+def test_no_span_begins_within_the_first_half_window() -> None:
+    case = pushed(240.0, 2.0, inf)
+    bare = fit(case, ())
+    spans = promising_spans(case, linearise(case, bare, starting_point(case, bare)), PUSH)
+    first, last = case.windows.middle_s[[0, -1]]
+    times = [getattr(one, end) for one in spans for end in one.times]
+    assert times
+    assert all(first < time < last for time in times)
+
+
+@pytest.mark.slow
 def test_the_gain_of_a_span_is_that_of_its_fit(monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
 
