@@ -126,11 +126,9 @@ def _sharpened(
     fine = np.unique(np.concatenate([edges[[0, last]], begins, ends]))
     a, b = (np.searchsorted(fine, times) for times in (begins, ends))
     a, b = (one.ravel() for one in np.meshgrid(a, b))
-    a, b = a[a < b], b[a < b]
-    if candidate.effect.passing:
-        lasts = fine[b] - fine[a]
-        allowed = (lasts >= shortest_s(problem, candidate)) & (lasts <= longest_s(problem, candidate))
-        a, b = a[allowed], b[allowed]
+    lasts = fine[b] - fine[a]
+    allowed = (lasts >= shortest_s(problem, candidate)) & (lasts <= longest_s(problem, candidate))
+    a, b = a[allowed], b[allowed]
     onset, offset = edges[i], edges[j]
     if len(a):
         G, g = _cross_products(problem, linearisation, candidate, fine)

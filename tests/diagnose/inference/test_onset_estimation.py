@@ -24,6 +24,7 @@ from ferryid.diagnose.inference.onset_estimation import (
     refit_spans,
 )
 from ferryid.diagnose.inference.search import list_candidates, search
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.rivals import compare_rivals
 from tests.diagnose.inference.test_estimation import PUSH, problem
@@ -128,6 +129,15 @@ def test_no_span_begins_within_the_first_half_window() -> None:
     times = [getattr(one, end) for one in spans for end in one.times]
     assert times
     assert all(first < time < last for time in times)
+
+
+@pytest.mark.slow
+def test_what_comes_and_goes_within_seconds_is_said_to_last_as_long_as_any_effect() -> None:
+    case, lasting = pushed(2400.0, 100.0, 103.0), replace(PUSH, effect=replace(PUSH.effect, onset=True))
+    bare = fit(case, ())
+    spans = promising_spans(case, linearise(case, bare, starting_point(case, bare)), lasting)
+    assert spans
+    assert min(one.offset_s - one.onset_s for one in spans) >= INFERENCE.span_s > 3.0
 
 
 @pytest.mark.slow
