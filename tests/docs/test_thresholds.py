@@ -171,7 +171,7 @@ NO_DECISION = {
         draft.actuator_fields _MOST_SHARED
         diagnose.inference.campaign_logs MOST_ROWS
         diagnose.inference.folds DRAWS
-        diagnose.inference.onset_estimation MOST_VALUES LATER_BLOCKS
+        diagnose.inference.onset_estimation MOST_VALUES LATER_BLOCKS FINE_TIMES
         diagnose.inference.simulation_baseline SHOWN_ROWS
         diagnose.judging.error_profiles SECTORS SPEEDS PLACES TIMES
         diagnose.gathering SHOWN_OVERLAPS
