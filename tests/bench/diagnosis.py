@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
+import json
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from ferryid.signals.recording import record
+from ferryid.validation.case import Case
+from ferryid.validation.log_generation import generate
 from ferryid.vessel import load_profile
 from tests.bench.page import Curve, Row, Section, Timed, duration
+from tests.bench.preparing import preparing
 from tests.bench.processes import Sampled, floor, middle, sampled_process
 from tests.bench.trials import VESSEL, written
+from tests.evidence import ROOT
 
 LENGTHS_S = {720: 5.0, 1440: 8.0, 3600: 45.0, 7200: 90.0}
 """Lengths of a single log [s], and the goal of each [s]; six hours are measured with gaps, in `tests.bench.long`."""
 REPEATED_S, REPEATS = 720, 3
 """Logs up to this length [s] are diagnosed so many times, and the median counts."""
+OF_PROOF_S = {"median": 5.0, "slowest": 10.0}
+"""Cases of the published proof, by how long they took in its run, and the goal of each [s]."""
 LOGS = {2: None, 5: None, 14: 20.0}
 """Logs of seven minutes in a campaign, and the goal of as many [s]."""
 LINEAR = 1.1
@@ -77,6 +85,10 @@ def run(quick: bool) -> Section:
                 curves.append(
                     Curve(f"diagnose, {'one log' if kind is single else 'campaign'}", against, list(times.items()))
                 )
+        if not quick:
+            for what, measured, goal_s in _of_proof(folder):
+                rows.append(_row(what, measured.took_s, measured.peak, goal_s, measured.took_s))
+                where.append(measured.where(what))
         notes = [
             "Whole processes, report included, on tables that were ingested before; logs of up to "
             f"{REPEATED_S / 60:.0f} min {REPEATS} times, of which the median counts.",
@@ -84,6 +96,33 @@ def run(quick: bool) -> Section:
             *where,
         ]
     return Section("Diagnosis", rows, notes, curves=curves)
+
+
+def _of_proof(folder: Path) -> Iterator[tuple[str, Sampled, float]]:
+    """Measure the median and the slowest of the single logs of 12 minutes of the published proof, each by itself.
+
+    Yields
+    ------
+    tuple
+        What it is, the measurement and its goal [s].
+    """
+    published = ROOT / "reports" / "proof"
+    answers = json.loads((published / "answers.json").read_text(encoding="utf-8"))["answers"]["cases"]
+    cases = {one.name: one for one in map(Case.from_json, answers) if one.path != "short"}
+    lines = map(json.loads, (published / "diagnosed.jsonl").read_text(encoding="utf-8").splitlines())
+    took = {one["name"]: float(one["result"]["seconds"]) for one in lines if one["name"] in cases}
+    order = sorted(took, key=lambda name: took[name])
+    for which, name in {"median": order[len(order) // 2], "slowest": order[-1]}.items():
+        case = cases[name]
+        with preparing():
+            files = generate(case, folder / "proof" / name)
+            record(files.log, load_profile(str(files.profile)), folder / "out")
+        command = ("diagnose", str(files.log), "--vessel", str(files.profile), "--out", str(folder / "out"))
+        yield (
+            f"diagnose, the {which} log of the proof ({case.cell})",
+            sampled_process(command, STEPS),
+            OF_PROOF_S[which],
+        )
 
 
 def _measured(paths: list[Path], folder: Path, repeats: int) -> Sampled:
