@@ -28,6 +28,7 @@ from ferryid.diagnose.inference.onset_estimation import (
     likeliest_start,
     linearise,
     part_s,
+    passes,
     promising_spans,
     refine_span,
     refit_spans,
@@ -205,7 +206,39 @@ def _ranked_candidates(
     found = [one for one in tried if one is not None]
     found.sort(key=lambda one: -one.gain)
     fair = over(partial(_with_own_noise, problem), found[: INFERENCE.compared_candidates])
-    return sorted([*fair, *found[INFERENCE.compared_candidates :]], key=lambda one: -one.gain)
+    ranked = sorted([*fair, *found[INFERENCE.compared_candidates :]], key=lambda one: -one.gain)
+    likelier = _in_the_same_span(problem, ranked[0], candidates) if ranked and ranked[0].candidate.times else []
+    there = {one.candidate.key: one for one in likelier}
+    best = [max(one, there.get(one.candidate.key, one), key=lambda each: each.gain) for one in ranked]
+    best += [one for key, one in there.items() if key not in {each.candidate.key for each in ranked}]
+    return sorted(best, key=lambda one: -one.gain)
+
+
+def _in_the_same_span(
+    problem: EstimationProblem, best: ScoredCandidate, candidates: Sequence[Candidate]
+) -> list[ScoredCandidate]:
+    """Return others in the span of the best, under the noise that each leaves there.
+
+    What is strong is held for noise at first, under which no span of another promises much.
+    """
+    fair = problem.with_noise_of(best.fit)
+    last = len(best.fit.candidates) - 1
+    bare = without(fair, best.fit, last)
+    begin = starting_point(fair, bare)
+    beside = linearise(fair, bare, begin)
+
+    def there(other: Candidate) -> ScoredCandidate | None:
+        moved = replace(other, onset_s=best.candidate.onset_s, offset_s=best.candidate.offset_s)
+        if moved.effect.passing and not (passes(fair, moved) and stands_out(fair, beside, moved)):
+            return None
+        moved = choose_parameters(fair, bare, moved)
+        values = (*bare.values, likeliest_start(fair, beside, moved))
+        made = fit(fair, (*bare.candidates, moved), values, steps=COARSE_ITERATIONS, begin=begin)
+        made = refit_with_own_noise(fair, fit(fair, made.candidates, made.values, begin=starting_point(fair, made)))
+        return ScoredCandidate(moved, made, made.evidence - (best.fit.evidence - best.gain))
+
+    others = [one for one in candidates if one.effect.onset and one.key != best.candidate.key]
+    return [one for one in over(there, others) if one is not None]
 
 
 def largest_gain_beside(problem: EstimationProblem, chosen: Fit, library: Sequence[Candidate]) -> float:
