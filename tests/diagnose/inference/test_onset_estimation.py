@@ -23,7 +23,7 @@ from ferryid.diagnose.inference.onset_estimation import (
     refine_span,
     refit_spans,
 )
-from ferryid.diagnose.inference.search import list_candidates, search
+from ferryid.diagnose.inference.search import ScoredCandidate, _in_the_same_span, list_candidates, search
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.rivals import compare_rivals
@@ -118,6 +118,27 @@ def test_where_nothing_pushes_no_span_is_promising() -> None:
     case = problem(0.0)
     bare = fit(case, ())
     assert promising_spans(case, linearise(case, bare, starting_point(case, bare)), PUSH) == []
+
+
+@pytest.mark.slow
+def test_every_other_effect_is_tried_in_the_span_that_one_has_found(tmp_path: Path) -> None:
+    pushing = '[[effects]]\neffect = "external_push"\nnorth = 0\neast = 400\nmoment = 0\nfrom_s = 200\nuntil_s = 320\n'
+    case = trial_on(sailed(tmp_path, "pushed", TWELVE + pushing, 5))
+    none = fit(case, ())
+    library = {one.key: one for one in list_candidates(case.plain.measurements)[0]}
+    mooring = replace(library["mooring", None], onset_s=200.0, offset_s=320.0)
+    made = fit(case, [mooring])
+    best = ScoredCandidate(mooring, made, made.evidence - none.evidence)
+    found = {one.candidate.effect.id: one for one in _in_the_same_span(case, best, list(library.values()))}
+    assert {(one.candidate.onset_s, one.candidate.offset_s) for one in found.values()} == {(200.0, 320.0)}
+    push = found["external_push"]
+    assert push.gain == max(one.gain for one in found.values())
+    # Under its own noise it is far ahead of what the mooring is under that of the whole.
+    assert push.gain > best.gain + 100.0
+    assert push.fit.values[-1][:2] == pytest.approx([0.0, 400.0], abs=20.0)
+    # Neither itself, nor what never sets in.
+    assert "mooring" not in found
+    assert "dead_band" not in found
 
 
 @pytest.mark.slow
