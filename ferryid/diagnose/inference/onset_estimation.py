@@ -34,7 +34,7 @@ LATER_BLOCKS = 8
 MOST_VALUES = 1e7
 """Numbers that a scan holds at once; parts are longer in long logs."""
 FINE_TIMES = 40
-"""About so many times, or fewer, are tried about either end of a promising span."""
+"""So many times at most are tried about either end of a promising span."""
 FIRST_TIME_STEP_S, LAST_TIME_STEP_S = 8.0, 0.2
 """Steps [s] with which a time is searched for nearby, from the first down to the last."""
 COMPARING_ITERATIONS = 3
@@ -122,7 +122,8 @@ def _sharpened(
     ends on the nearest.
     """
     last = len(edges) - 1
-    begins, ends = (_steps_about(problem, edges, k) for k in (i, j))
+    most = max(1, min(FINE_TIMES, int(0.5 * _most_parts(problem, candidate))))
+    begins, ends = (_steps_about(problem, edges, k, most) for k in (i, j))
     fine = np.unique(np.concatenate([edges[[0, last]], begins, ends]))
     a, b = (np.searchsorted(fine, times) for times in (begins, ends))
     a, b = (one.ravel() for one in np.meshgrid(a, b))
@@ -137,8 +138,8 @@ def _sharpened(
     return replace(candidate, onset_s=float(onset) if i > 0 else 0.0, offset_s=float(offset) if j < last else inf)
 
 
-def _steps_about(problem: EstimationProblem, edges: Floats, k: int) -> Floats:
-    """Return the times of steps within a part of an edge, its own among them [s]; of either end of the log that alone.
+def _steps_about(problem: EstimationProblem, edges: Floats, k: int, most: int) -> Floats:
+    """Return times of steps within a part of an edge, `most` and its own [s]; of either end of the log that alone.
 
     None is outside the middles of the windows, between which a time is estimated.
     """
@@ -146,7 +147,7 @@ def _steps_about(problem: EstimationProblem, edges: Floats, k: int) -> Floats:
         return edges[[k]]
     times, middles = problem.steps.middle_s, problem.windows.middle_s
     near = times[(times > max(edges[k - 1], middles[0])) & (times < min(edges[k + 1], middles[-1]))]
-    return np.unique(np.append(near[:: max(1, len(near) // FINE_TIMES)], edges[k]))
+    return np.unique(np.append(near[:: max(1, -(-len(near) // most))], edges[k]))
 
 
 def stands_out(problem: EstimationProblem, linearisation: Linearisation, candidate: Candidate) -> bool:
@@ -244,11 +245,14 @@ def _edges(problem: EstimationProblem, candidate: Candidate) -> Floats:
     A part is as long as the shortest span of the candidate.
     """
     times = problem.steps.middle_s
-    most = MOST_VALUES / (len(times) * problem.steps.channels.sum() * len(candidate.parameters))
-    parts = max(
-        INFERENCE.span_parts, int(min(len(times) * stride_s(problem.steps) / shortest_s(problem, candidate), most))
-    )
+    shortest = len(times) * stride_s(problem.steps) / shortest_s(problem, candidate)
+    parts = max(INFERENCE.span_parts, int(min(shortest, _most_parts(problem, candidate))))
     return np.interp(np.linspace(0.0, len(times) - 1.0, parts + 1), np.arange(len(times)), times)
+
+
+def _most_parts(problem: EstimationProblem, candidate: Candidate) -> float:
+    """Return how many parts a scan has room for."""
+    return MOST_VALUES / (len(problem.steps.middle_s) * int(problem.steps.channels.sum()) * len(candidate.parameters))
 
 
 def _cross_products(

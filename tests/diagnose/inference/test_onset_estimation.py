@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from math import inf
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -139,6 +140,30 @@ def test_every_other_effect_is_tried_in_the_span_that_one_has_found(tmp_path: Pa
     # Neither itself, nor what never sets in.
     assert "mooring" not in found
     assert "dead_band" not in found
+
+
+@pytest.mark.slow
+def test_a_long_log_has_fewer_times_about_an_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    case, counts = pushed(240.0, 90.0, 170.0), list[int]()
+    cross_products = onset_estimation._cross_products
+
+    def spy(*given: Any) -> Any:
+        counts.append(len(given[-1]))
+        return cross_products(*given)
+
+    monkeypatch.setattr(onset_estimation, "_cross_products", spy)
+    bare = fit(case, ())
+    line = linearise(case, bare, starting_point(case, bare))
+    promising_spans(case, line, PUSH)
+    usual = max(counts[1:])
+    counts.clear()
+    room = 12
+    monkeypatch.setattr(
+        onset_estimation, "MOST_VALUES", room * len(case.steps.middle_s) * int(case.steps.channels.sum())
+    )
+    promising_spans(case, line, PUSH)
+    # Both ends of the log, and the two edges themselves, come besides.
+    assert max(counts[1:]) <= room + 4 < usual
 
 
 @pytest.mark.slow
