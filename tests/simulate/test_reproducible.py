@@ -134,7 +134,8 @@ arrays = {}
 for stream in simulation.streams:
     arrays[f"{stream.topic} stamp"], arrays[f"{stream.topic} receive"] = stream.stamp_ns, stream.receive_ns
     arrays.update({f"{stream.topic} {path}": values for path, values in stream.columns.items()})
-np.savez(folder.with_suffix(".npz"), **arrays)
+# What a library's functions give tells one machine from another, whether or not a trial does.
+np.savez(folder.with_suffix(".npz"), **arrays, library=np.sin(np.linspace(-50.0, 50.0, 100_001)))
 """
 
 
@@ -211,10 +212,10 @@ def brief(tmp_path_factory):
 
 
 def test_equal_numbers_on_another_machine(brief, tmp_path):
-    files, arrays = trial(tmp_path / "log", BRIEF_S, COMPILED_THERE, **OTHER_MACHINE)
+    _, arrays = trial(tmp_path / "log", BRIEF_S, COMPILED_THERE, **OTHER_MACHINE)
     assert_equal(arrays, brief[1])
-    if files == brief[0]:
-        pytest.skip("the bytes are the same as well: nothing can be taken away from this machine")
+    if np.array_equal(arrays["library"], brief[1]["library"]):
+        pytest.skip("nothing can be taken away from this machine: its sines are the same to the last bit")
 
 
 def test_equal_numbers_without_the_compiler(brief, tmp_path):

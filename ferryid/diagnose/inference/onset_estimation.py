@@ -119,9 +119,15 @@ def _sharpened(
     """Return a candidate in the span from one edge to another, its ends where it promises most within a part of these.
 
     Noise that swings gives the evidence a top every period: between two edges there are several, and a search that goes uphill
-    ends on the nearest.
+    ends on the nearest. What is brief stays as it is (see `is_brief`): it is no name, and would take what the ends of something
+    that lasts leave.
     """
     last = len(edges) - 1
+    coarse = replace(
+        candidate, onset_s=float(edges[i]) if i > 0 else 0.0, offset_s=float(edges[j]) if j < last else inf
+    )
+    if is_brief(problem, coarse):
+        return coarse
     most = max(1, min(FINE_TIMES, int(0.5 * _most_parts(problem, candidate))))
     begins, ends = (_steps_about(problem, edges, k, most) for k in (i, j))
     fine = np.unique(np.concatenate([edges[[0, last]], begins, ends]))
@@ -130,12 +136,12 @@ def _sharpened(
     lasts = fine[b] - fine[a]
     allowed = (lasts >= shortest_s(problem, candidate)) & (lasts <= longest_s(problem, candidate))
     a, b = a[allowed], b[allowed]
-    onset, offset = edges[i], edges[j]
-    if len(a):
-        G, g = _cross_products(problem, linearisation, candidate, fine)
-        best = int(np.argmax(_gains(G, g, a, b, candidate)))
-        onset, offset = fine[a[best]], fine[b[best]]
-    return replace(candidate, onset_s=float(onset) if i > 0 else 0.0, offset_s=float(offset) if j < last else inf)
+    if not len(a):
+        return coarse
+    G, g = _cross_products(problem, linearisation, candidate, fine)
+    best = int(np.argmax(_gains(G, g, a, b, candidate)))
+    onset, offset = float(fine[a[best]]), float(fine[b[best]])
+    return replace(coarse, onset_s=onset if i > 0 else 0.0, offset_s=offset if j < last else inf)
 
 
 def _steps_about(problem: EstimationProblem, edges: Floats, k: int, most: int) -> Floats:

@@ -25,6 +25,7 @@ from ferryid.diagnose.inference.onset_estimation import (
     COMPARING_ITERATIONS,
     FIRST_TIME_STEP_S,
     Linearisation,
+    is_brief,
     likeliest_start,
     linearise,
     part_s,
@@ -207,8 +208,8 @@ def _ranked_candidates(
     found.sort(key=lambda one: -one.gain)
     fair = over(partial(_with_own_noise, problem), found[: INFERENCE.compared_candidates])
     ranked = sorted([*fair, *found[INFERENCE.compared_candidates :]], key=lambda one: -one.gain)
-    likelier = _in_the_same_span(problem, ranked[0], candidates) if ranked and ranked[0].candidate.times else []
-    there = {one.candidate.key: one for one in likelier}
+    lasts = bool(ranked and ranked[0].candidate.times) and not is_brief(problem, ranked[0].candidate)
+    there = {one.candidate.key: one for one in _in_the_same_span(problem, ranked[0], candidates)} if lasts else {}
     best = [max(one, there.get(one.candidate.key, one), key=lambda each: each.gain) for one in ranked]
     best += [one for key, one in there.items() if key not in {each.candidate.key for each in ranked}]
     return sorted(best, key=lambda one: -one.gain)
@@ -219,7 +220,8 @@ def _in_the_same_span(
 ) -> list[ScoredCandidate]:
     """Return others in the span of the best, under the noise that each leaves there.
 
-    What is strong is held for noise at first, under which no span of another promises much.
+    What is strong is held for noise at first, under which no span of another promises much. What is brief is no name, whatever
+    else could stand there.
     """
     fair = problem.with_noise_of(best.fit)
     last = len(best.fit.candidates) - 1

@@ -178,12 +178,15 @@ def test_no_span_begins_within_the_first_half_window() -> None:
 
 
 @pytest.mark.slow
-def test_what_comes_and_goes_within_seconds_is_said_to_last_as_long_as_any_effect() -> None:
-    case, lasting = pushed(2400.0, 100.0, 103.0), replace(PUSH, effect=replace(PUSH.effect, onset=True))
+def test_what_is_brief_keeps_the_ends_of_the_scan() -> None:
+    case, lasting = pushed(240.0, 103.0, 125.0), replace(PUSH, effect=replace(PUSH.effect, onset=True))
     bare = fit(case, ())
     spans = promising_spans(case, linearise(case, bare, starting_point(case, bare)), lasting)
-    assert spans
-    assert min(one.offset_s - one.onset_s for one in spans) >= INFERENCE.span_s > 3.0
+    brief = [one for one in spans if is_brief(case, one)]
+    edges = onset_estimation._edges(case, lasting).tolist()
+    assert brief
+    assert all(getattr(one, end) in edges for one in brief for end in one.times)
+    assert min(one.offset_s - one.onset_s for one in spans) >= INFERENCE.span_s
 
 
 @pytest.mark.slow
