@@ -10,6 +10,7 @@ from ferryid.identify.settings import FitSettings
 from ferryid.signals.copies import GivenLogs
 from ferryid.signals.prepare import Opened, open_track
 from ferryid.signals.stream import compact
+from ferryid.signals.thresholds import SIGNALS
 from ferryid.types import RunContext
 from ferryid.vessel.profile import Profile
 
@@ -17,7 +18,10 @@ from ferryid.vessel.profile import Profile
 def read_logs(
     paths: Sequence[str], profile: Profile, settings: FitSettings, run: RunContext, *, whole: bool = True
 ) -> list[Opened]:
-    """Read several logs and align their signals, before smoothing.
+    """Read several logs and align their signals, before smoothing; they are returned in order of time.
+
+    What is held out of short logs depends on their order, and should not on that in which they were given. That order stays where
+    a log's times are no dates, and of logs that begin at once.
 
     With `whole` False, their recordings are `compact`, which leaves a third of the memory where nobody asks for the quality of
     their signals.
@@ -33,4 +37,7 @@ def read_logs(
         one = open_track(path, profile, run.tables, rate_hz=settings.rate_hz, verify=run.verify, ranges=run.ranges)
         given.add(one.recording)
         opened.append(one if whole else replace(one, recording=compact(one.recording)))
-    return opened
+    begins = [one.recording.start_ns for one in opened]
+    if min(begins, default=0) < SIGNALS.epoch_ns:
+        return opened
+    return [opened[i] for i in sorted(range(len(opened)), key=lambda i: begins[i])]
