@@ -20,8 +20,8 @@ def read_logs(
 ) -> list[Opened]:
     """Read several logs and align their signals, before smoothing; they are returned in order of time.
 
-    What is held out of short logs depends on their order, and should not on that in which they were given. That order stays where
-    a log's times are no dates, and of logs that begin at once.
+    What is held out of short logs depends on their order, and should not on that in which they were given. That order stays
+    where a log's times are no dates, and of logs that begin at once.
 
     With `whole` False, their recordings are `compact`, which leaves a third of the memory where nobody asks for the quality of
     their signals.

@@ -9,6 +9,7 @@ import pytest
 
 from ferryid.identify import inputs
 from ferryid.identify.settings import FitSettings
+from ferryid.signals.copies import GivenLogs
 from ferryid.types import RunContext
 from ferryid.vessel import load_profile
 
@@ -34,6 +35,6 @@ def test_logs_are_read_into_order_of_time(
         return SimpleNamespace(path=path, recording=SimpleNamespace(start_ns=begins[path]))
 
     monkeypatch.setattr(inputs, "open_track", opened)
-    monkeypatch.setattr(inputs.GivenLogs, "add", lambda *_: None)
+    monkeypatch.setattr(GivenLogs, "add", lambda *_: None)
     found = inputs.read_logs(list(given), load_profile("milliampere"), FitSettings(), RunContext(Path("nowhere")))
     assert "".join(one.path for one in found) == read  # type: ignore[attr-defined]
