@@ -241,7 +241,11 @@ def _agreement(pose: _Pose, velocity: FieldGroup | None, samples: Samples) -> _A
 
 
 def _explained(first: Floats, second: Floats, x: Floats, y: Floats) -> tuple[float, float, float]:
-    """Return which share of a measured vector another explains, with what gain, and the correlation of their second parts."""
+    """Return which share of a measured vector another explains, how many times as large it is, and how second parts correlate.
+
+    The vector is a velocity and the other the slope of a position, which is the noisier: how large the velocity is of it comes
+    from the regression of the slope on the velocity, as where a log is checked. The other regression takes noise for size.
+    """
     rows = np.isfinite(first + second + x + y)
     rows &= _usual(np.hypot(x, y), rows)
     if np.count_nonzero(rows) < DRAFT.fewest_rows:
@@ -254,7 +258,8 @@ def _explained(first: Floats, second: Floats, x: Floats, y: Floats) -> tuple[flo
     rows &= error <= np.quantile(error[rows], 0.95)
     total = float(np.sum(first[rows] ** 2 + second[rows] ** 2))
     share = 1.0 - float(np.sum(error[rows] ** 2)) / total if total > 0.0 else 0.0
-    return share, gain, _correlation(second[rows], y[rows])
+    both = float(first[rows] @ x[rows] + second[rows] @ y[rows])
+    return share, total / both if both > 0.0 else gain, _correlation(second[rows], y[rows])
 
 
 def _usual(size: Floats, rows: Flags) -> Flags:

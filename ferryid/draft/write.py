@@ -154,7 +154,8 @@ def as_text(draft: Draft, file: str, text: str) -> str:
     # A profile can do without the areas that a wind acts on.
     wind = " (those of [wind] only if a wind is to be tested)" if f"{MARK} [wind]" in text else ""
     todo = f"fill in {counted(count, 'line')} marked {mark}{wind}, then " if count else ""
-    lines.append(f"next    {todo}ferryid vessel check {file}, ferryid inspect {draft.log}, ferryid fit {draft.log}")
+    steps = [f"ferryid {verb} {draft.log} --vessel {file}" for verb in ("inspect", "fit")]
+    lines.append(f"next    {todo}ferryid vessel check {file}, {', '.join(steps)}")
     return "\n".join(lines)
 
 

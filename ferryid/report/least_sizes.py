@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import inf
 from shlex import quote
 
 from ferryid.counts import counted
 from ferryid.diagnose.judging import Diagnosis, LeastSize
+from ferryid.effects import effects
 
 SHOWN = 5
 """Effects on a terminal: the page and the JSON have all."""
@@ -39,9 +39,15 @@ def line(diagnosis: Diagnosis) -> str:
 
 
 def proof(diagnosis: Diagnosis) -> str:
-    """Return the command that measures such sizes in the log itself."""
-    names: Sequence[str] = list(dict.fromkeys(one.effect for one in diagnosis.least_sizes))
-    wanted = [name for name in ("wind", "payload") if name in names] or list(names[:2])
+    """Return the command that measures such sizes in the log itself; empty where nothing would be seen at any size.
+
+    Errors of sensors can be concealed in any record, loads only where the actuators push freely on every axis.
+    """
+    seen = list(dict.fromkeys(one.effect for one in diagnosis.least_sizes if one.value is not None))
+    known = effects()
+    wanted = [name for name in seen if name in known and known[name].of_sensor][:2] or seen[:2]
+    if not wanted:
+        return ""
     recording, vessel = quote(diagnosis.path or diagnosis.log), quote(diagnosis.profile or diagnosis.vessel)
     return f"ferryid prove --real {recording} --vessel {vessel} --only {','.join(wanted)}"
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, without
+from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, fit, without
 from ferryid.diagnose.inference.onset_estimation import is_brief
 from ferryid.diagnose.inference.search import is_negligible, prune
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.axis_consistency import check_axis_consistency
 from ferryid.diagnose.judging.credibility import interval_doubt
 from ferryid.diagnose.judging.held_out import HeldOutEvidence, held_out_evidence
@@ -69,14 +70,15 @@ def eliminate_backward(
     while kept.candidates:
         progress("weighing rivals")
         standings = tuple(compare_rivals(problem, kept, i, library) for i in range(len(kept.candidates)))
-        better = [one for standing in standings for one in standing.rivals[:1] if one.gain > 0.0]
-        better = [one for one in better if one.fit.keys not in tried]
+        better = [(i, one) for i, standing in enumerate(standings) for one in standing.rivals[:1] if one.gain > 0.0]
+        better = [(i, one) for i, one in better if one.fit.keys not in tried]
         if better and swaps < JUDGING.most_replacements:
             # What was selected first may be less likely beside what was selected later than another in its place.
-            best = max(better, key=lambda one: one.gain)
+            replaced, best = max(better, key=lambda pair: pair[1].gain)
             tried.add(best.fit.keys)
             swaps += 1
-            kept = prune(problem, best.fit)
+            kept = prune(problem, _with_both(problem, kept, replaced, best.fit))
+            tried.add(kept.keys)
             continue
         progress("judging on held-out stretches")
         proof = held_out_evidence(problem, kept)
@@ -88,6 +90,13 @@ def eliminate_backward(
         kept = prune(problem, without(problem, kept, fallen))
         tried.add(kept.keys)
     return Elimination(kept, None, (), _told(fallen_by_reason))
+
+
+def _with_both(problem: EstimationProblem, kept: Fit, replaced: int, rival: Fit) -> Fit:
+    """Return a fit with a rival, and beside it what it replaces where that is more likely than not: both may act."""
+    candidate, values = kept.candidates[replaced], kept.values[replaced]
+    both = fit(problem, [*rival.candidates, candidate], [*rival.values, values])
+    return both if both.evidence - rival.evidence > INFERENCE.prior_odds else rival
 
 
 def _told(fallen_by_reason: Mapping[str, Sequence[str]]) -> tuple[str, ...]:

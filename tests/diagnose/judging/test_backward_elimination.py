@@ -9,7 +9,15 @@ import pytest
 
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, fit, starting_point
 from ferryid.diagnose.inference.search import list_candidates, search
-from ferryid.diagnose.judging.backward_elimination import BRIEF, LAW, PLACEBO, _fallen, _told, eliminate_backward
+from ferryid.diagnose.judging.backward_elimination import (
+    BRIEF,
+    LAW,
+    PLACEBO,
+    _fallen,
+    _told,
+    _with_both,
+    eliminate_backward,
+)
 from tests.diagnose.trials import sailed, trial_on
 
 pytestmark = pytest.mark.slow
@@ -54,6 +62,13 @@ def test_a_fit_ends_at_the_same_place_wherever_it_begins(problem: EstimationProb
     assert afar.evidence == pytest.approx(close.evidence, abs=0.5)
     for one, other, errors in zip(afar.values, close.values, (afar.errors(0), afar.errors(1)), strict=True):
         assert np.all(np.abs(one - other) < 0.05 * errors)
+
+
+def test_what_a_rival_replaces_stays_beside_it_where_both_act(problem: EstimationProblem) -> None:
+    loss, first = (fit(problem, of(problem, key)) for key in (LOSS, FIRST))
+    assert _with_both(problem, loss, 0, first).keys == {LOSS, FIRST}
+    both, wrong = fit(problem, of(problem, LOSS, FIRST)), fit(problem, of(problem, SECOND))
+    assert _with_both(problem, wrong, 0, both) is both
 
 
 def test_both_are_found_though_the_other_thrusters_gain_is_likelier_alone(problem: EstimationProblem) -> None:
