@@ -118,7 +118,7 @@ proof-sea: $(VENV)/installed
 # Conceals effects in real recordings, where they are present, and diagnoses them blind: writes reports/proof-real.json and
 # figures, and with the stored results of proof the page reports/proof.md. SEED=N and RUNS=N as for the proof; about twenty
 # minutes on two cores.
-proof-real: SEED ?= 20271203
+proof-real: SEED ?= 20271205
 proof-real: RUNS ?= 2
 proof-real: $(VENV)/installed
 	$(BIN)/ferryid prove --real tests/real/recordings.toml --seed $(SEED) --runs $(RUNS) --out $(DEMO) \
