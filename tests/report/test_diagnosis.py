@@ -47,6 +47,7 @@ from ferryid.report.diagnosis_words import (
     where,
 )
 from ferryid.report.figures import STYLE, canvas
+from ferryid.report.least_sizes import proof
 from ferryid.types import AXES
 from ferryid.vessel import load_profile
 from tests.report.pages import needs_nothing
@@ -270,6 +271,18 @@ def test_what_no_size_would_have_shown_stands_in_the_verdict() -> None:
         "payload and 1 more would not have been seen at any size."
     )
     assert headline(replace(diagnosis("matched"), least_sizes=(seen,))).startswith("Matched: nothing")
+
+
+def test_the_command_that_measures_sizes_conceals_what_any_record_can_carry() -> None:
+    """Twin propellers push in no sway, so that no load can be concealed in their records; an error of a sensor always can."""
+    sizes = [
+        LeastSize("payload", None, None, "kg", ""),
+        LeastSize("wind", None, 2.0, "m/s", ""),
+        LeastSize("heading_bias", None, 1.0, "deg", ""),
+    ]
+    assert proof(replace(diagnosis("matched"), least_sizes=tuple(sizes))).endswith(" --only heading_bias")
+    assert proof(replace(diagnosis("matched"), least_sizes=tuple(sizes[:2]))).endswith(" --only wind")
+    assert proof(replace(diagnosis("matched"), least_sizes=tuple(sizes[:1]))) == ""
 
 
 def test_copies_stand_once_in_the_json_of_a_campaign() -> None:
