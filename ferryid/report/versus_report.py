@@ -8,6 +8,7 @@ from typing import Any
 
 from ferryid.counts import counted
 from ferryid.diagnose import GROUPS, JUDGING, DiagnosisSettings, Difference, Versus, compare_groups, versus_json
+from ferryid.effects.wording import listed
 from ferryid.errors import FerryIdError
 from ferryid.files import finite
 from ferryid.report.folder import PAGE, made, write_folder
@@ -18,6 +19,9 @@ from ferryid.report.versus_figures import intervals
 from ferryid.report.versus_timeline import versus_timeline
 from ferryid.types import RunContext
 from ferryid.vessel.profile import Profile
+
+SHOWN = 4
+"""Logs of a group that a terminal names: the page has all."""
 
 
 def compare_and_report(
@@ -62,8 +66,9 @@ def compare_and_report(
 
 def as_text(found: Versus) -> str:
     """Return a comparison of groups as a terminal shows it."""
-    lines = [f"{found.vessel}: {' against '.join(_group_line(found, group) for group in reversed(found.groups))}", ""]
-    lines.append(found.summary)
+    lines = [f"{found.vessel}: {' against '.join(_group_line(found, group) for group in reversed(found.groups))}"]
+    lines += [f"  {group}: {_names(found, group)}" for group in found.groups]
+    lines += ["", found.summary]
     for one in found.judged.differences:
         lines.append(f"  {probability(one)}  {one.says}")
         if rivals := unresolved(one):
@@ -74,7 +79,7 @@ def as_text(found: Versus) -> str:
     if found.judged.compared:
         lines += ["", "Not favoured by the evidence: estimate and 95 % interval"]
         lines += [f"  {one.says}" for one in found.judged.compared]
-    lines += ["", *(f"note: {one}" for one in (*found.notes, found.smallest) if one)]
+    lines += ["", *(f"note: {one}" for one in (*found.notes, found.smallest, _never_seen(found)) if one)]
     return "\n".join(lines)
 
 
@@ -97,6 +102,18 @@ def unresolved(one: Difference) -> str:
 def _group_line(found: Versus, group: str) -> str:
     logs = found.groups[group]
     return f"{group} ({counted(len(logs), 'log')}, {sum(one.duration_s for one in logs):.0f} s)"
+
+
+def _names(found: Versus, group: str) -> str:
+    names = [one.name for one in found.groups[group]]
+    more = len(names) - SHOWN
+    return ", ".join(names[:SHOWN]) + (f" and {counted(more, 'log')} more" if more > 0 else "")
+
+
+def _never_seen(found: Versus) -> str:
+    """Return which differences no size would have shown, as a sentence; empty where there is none."""
+    titles = [one.title for one in found.judged.compared if not any(each is not None for each in one.smallest.values())]
+    return f"Would not have been seen at any size: {listed(titles)}." if titles else ""
 
 
 def render(found: Versus, command: Sequence[str] = (), interactive: Interactive = STATIC) -> tuple[str, dict[str, str]]:

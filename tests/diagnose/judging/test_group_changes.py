@@ -28,7 +28,7 @@ from ferryid.diagnose.versus import GroupLog, Versus, versus_json
 from ferryid.effects import effects
 from ferryid.effects.force_model import ForceModel, hull_of
 from ferryid.effects.fouling import SECOND_ORDER
-from ferryid.effects.wording import ALL_THRUSTERS
+from ferryid.effects.wording import ALL_THRUSTERS, listed
 from ferryid.report.versus_report import as_text, render
 from ferryid.types import no_progress
 from ferryid.vessel.hull import payload_mass
@@ -162,3 +162,8 @@ def test_text_page_and_json_have_the_difference() -> None:
         assert "Thruster force (thruster1), B relative to A: factor 0." in shown
         assert "With one log in each group" in shown
     assert drawings["differences"].startswith("<svg")
+    for group, logs in found.groups.items():
+        assert f"\n  {group}: {logs[0].name}\n" in text
+    unseen = [replace(one, smallest=dict.fromkeys(one.smallest)) for one in found.judged.compared]
+    blind = as_text(replace(found, judged=replace(found.judged, compared=tuple(unseen))))
+    assert f"note: Would not have been seen at any size: {listed([one.title for one in unseen])}." in blind
