@@ -115,7 +115,7 @@ def _context(result: FitOutcome, interactive: Interactive, drawings: Drawings) -
             {
                 "name": one.name
                 + (", used" if one.chosen else "")
-                + ("" if one.possible else ", physically impossible"),
+                + ("" if one.possible else ", with inertia or damping that no hull has"),
                 "folds": f"{one.folds:.3f}" if isfinite(one.folds) else "unknown, too short for it",
                 "held_out": f"{one.held_out:.3f}" if isfinite(one.held_out) else "–",
             }
