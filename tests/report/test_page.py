@@ -129,7 +129,10 @@ def test_an_estimator_without_a_model_on_the_folds_is_said_to_be_without_one(
     )
     compared = replace(result, estimators=scores)
     page = render(compared)[0]
-    assert "<td>weak, with inertia or damping that no hull has</td><td>unknown, too short for it</td><td>0.110</td>" in page
+    assert (
+        "<td>weak, with inertia or damping that no hull has</td><td>unknown, too short for it</td><td>0.110</td>"
+        in page
+    )
     told = as_text(compared, StoredModel(tmp_path / "1.json", compared.model, current=False), None)
     assert (
         "model's: unknown on folds of the training rows, which are too short for it, 0.110 held out; no hull has such"
