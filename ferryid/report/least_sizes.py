@@ -45,7 +45,8 @@ def proof(diagnosis: Diagnosis) -> str:
     """
     seen = list(dict.fromkeys(one.effect for one in diagnosis.least_sizes if one.value is not None))
     known = effects()
-    wanted = [name for name in seen if name in known and known[name].of_sensor][:2] or seen[:2]
+    of_sensors = [name for name in seen if name in known and known[name].of_sensor]
+    wanted = of_sensors[:2] or [name for name in ("wind", "payload") if name in seen] or seen[:2]
     if not wanted:
         return ""
     recording, vessel = quote(diagnosis.path or diagnosis.log), quote(diagnosis.profile or diagnosis.vessel)
