@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import typer
 
-from ferryid.cli.options import OUT, Json, Out
+from ferryid.cli.options import OUT, AnyOut, Json
 from ferryid.cli.output import emit
 
 
-def command(out: Out = OUT, json: Json = None) -> None:
+def command(out: AnyOut = OUT, json: Json = None) -> None:
     """Show versions, optional parts, compile cache, cores, memory and disk; exit code 2 where one of them stops commands."""
     from ferryid import api
 

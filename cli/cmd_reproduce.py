@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from ferryid.cli.options import OUT, Json
+from ferryid.cli.options import OUT, Json, PageOut
 from ferryid.cli.output import emit, progress
 
 STUDIES = (
@@ -30,7 +29,7 @@ STUDIES = (
 
 def command(
     what: Annotated[str, typer.Argument(help="What to reproduce: thesis.")],
-    out: Annotated[Path, typer.Option("--out", help="Folder for the page and its figures.")] = OUT,
+    out: PageOut = OUT,
     only: Annotated[
         list[str] | None, typer.Option("--only", help=f"A study by name: {', '.join(STUDIES)}. May be given again.")
     ] = None,

@@ -13,6 +13,25 @@ from ferryid.cli.completion import vessel_names
 from ferryid.errors import FerryIdError
 from ferryid.regression.bases import basis_names
 
+
+def _folder(context: typer.Context, out: Path) -> Path:
+    """Refuse a place for results that is no folder before anything is done."""
+    if not context.resilient_parsing:
+        from ferryid.files import check_folder
+
+        check_folder(out)
+    return out
+
+
+def _result(context: typer.Context, json: str | None) -> str | None:
+    """Refuse a place for a JSON result that cannot take one before anything is done."""
+    if json not in (None, "-") and not context.resilient_parsing:
+        from ferryid.files import check_result
+
+        check_result(Path(json))
+    return json
+
+
 Logs = Annotated[
     list[str],
     typer.Argument(help="Bags, MCAP files, CSV or Parquet tables, or folders; parts of one log joined by +."),
@@ -40,9 +59,13 @@ ModelVessel = Annotated[
         help="Vessel profile of the logs, in place of the model's: a name, or the path of a TOML file.",
     ),
 ]
-Out = Annotated[Path, typer.Option("--out", help="Folder for tables, models and reports.")]
+Out = Annotated[Path, typer.Option("--out", help="Folder for tables, models and reports.", callback=_folder)]
+PageOut = Annotated[Path, typer.Option("--out", help="Folder for the page and its figures.", callback=_folder)]
+AnyOut = Annotated[Path, typer.Option("--out", help="Folder for tables, models and reports.")]
+"""For commands that tell themselves what is wrong with a folder."""
 Json = Annotated[
-    str | None, typer.Option("--json", help="Write the result as JSON to this file, - for standard output.")
+    str | None,
+    typer.Option("--json", help="Write the result as JSON to this file, - for standard output.", callback=_result),
 ]
 Verify = Annotated[bool, typer.Option("--verify", help="Read the whole file and check every checksum.")]
 From = Annotated[

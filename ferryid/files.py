@@ -344,8 +344,38 @@ def unwritable(path: Path, error: OSError, by: str = "--out") -> UnwritableError
     what = "folder" if by == "--out" else "place"
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         return UnwritableError(f"{path}: the disk is full. Fix: free some space, or choose another {what} with {by}")
+    if error.errno in (errno.EEXIST, errno.ENOTDIR) and (file := _file_for_folder(path)):
+        return no_folder(file, by)
     reason = error.strerror or type(error).__name__
     return UnwritableError(f"{path}: cannot be written, {reason}. Fix: choose a {what} you may write to with {by}")
+
+
+def _file_for_folder(path: Path) -> Path | None:
+    """Return what stands where `path` or a folder above it was to be and is no folder, None where nothing does."""
+    there = next((place for place in (path, *path.parents) if os.path.lexists(place)), None)
+    return None if there is None or there.is_dir() else there
+
+
+def no_folder(path: Path, by: str = "--out") -> UnwritableError:
+    """Return the error for a place where a folder was to be and something else is, `by` the option that names another."""
+    what = "file" if path.is_file() else "link to nothing" if path.is_symlink() else "special file"
+    return UnwritableError(f"{path}: is a {what}, and a folder was to be there. Fix: name another place with {by}")
+
+
+def check_folder(path: Path) -> None:
+    """Refuse a place for results that is no folder, or lies below something that is none; nothing need be there yet.
+
+    Raises
+    ------
+    UnwritableError
+        When a file or the like is there.
+    """
+    try:
+        file = _file_for_folder(path)
+    except OSError as error:
+        raise unwritable(path, error) from error
+    if file:
+        raise no_folder(file)
 
 
 def taken(path: Path) -> FerryIdError:
@@ -379,7 +409,9 @@ def check_result(path: Path) -> bool:
         other = path.is_file() and path.suffix != ".json" and path.stat().st_size > 0
     except OSError as error:
         raise unwritable(path, error, "--json") from error
-    if path.is_dir() or other:
+    if path.is_dir():
+        raise UnwritableError(f"{path}: is a folder, and a file was to be written. Fix: give --json the name of a file")
+    if other:
         raise FerryIdError(
             f"{path}: is there already and no JSON file, so it is not written over. Fix: give --json another name"
         )

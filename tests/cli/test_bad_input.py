@@ -221,12 +221,31 @@ def test_an_output_folder_without_permission(ferryid, fixtures: Path, tmp_path: 
     refused(ferryid("ingest", fixtures / "short.mcap", "--vessel", "milliampere", "--out", tmp_path / "out"), "written")
 
 
-def test_an_output_folder_that_is_a_file(ferryid, fixtures: Path, tmp_path: Path) -> None:
-    (tmp_path / "out").write_text("", encoding="utf-8")
-    refused(
-        ferryid("fit", fixtures / "short.mcap", "--vessel", "milliampere", "--out", tmp_path / "out"),
-        "cannot be written",
-    )
+@pytest.mark.parametrize(
+    "command",
+    [
+        *(("ingest", "short.bag"), ("fit", "short.bag"), ("diagnose", "short.bag"), ("batch", "short.bag")),
+        *(("sweep", "basis", "short.bag"), ("evaluate", "a", "short.bag"), ("compare", "a", "short.bag")),
+        *(("models",), ("plan", "--vessel", "milliampere"), ("export", "a", "--to", "python"), ("reproduce", "thesis")),
+        ("prove", "--only", "wind"),
+    ],
+    ids=lambda command: command[0],
+)
+def test_every_output_folder_that_is_a_file_is_told_alike(
+    ferryid, fixtures: Path, tmp_path: Path, command: tuple[str, ...]
+) -> None:
+    (tmp_path / "out").write_text("not a folder")
+    for out in (tmp_path / "out", tmp_path / "out" / "deeper"):
+        run = ferryid(*(fixtures / word if word == "short.bag" else word for word in command), "--out", out)
+        refused(
+            run,
+            f"ferryid: {tmp_path / 'out'}: is a file, and a folder was to be there. Fix: name another place with --out",
+        )
+
+
+def test_a_folder_in_the_place_of_a_json_result(ferryid, fixtures: Path, tmp_path: Path) -> None:
+    for command in (("inspect", fixtures / "short.bag"), ("vessel", "list"), ("fit", tmp_path / "none.bag")):
+        refused(ferryid(*command, "--json", tmp_path), f"{tmp_path}: is a folder, and a file was to be written")
 
 
 @pytest.mark.slow
