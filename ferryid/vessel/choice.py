@@ -6,6 +6,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from shlex import quote
 
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError
@@ -216,7 +217,7 @@ def _none_fits(log: str, matches: Sequence[Match]) -> str:
     others = f"{counted(rest, 'other')} {'have' if rest > 1 else 'has'} fewer" if near else "none has a signal of it"
     listed = f"nearest are {told}; {others}" if near and rest else told or others
     return (
-        f"{log}: no vessel profile fits this log, {listed}. Fix: draft one with ferryid vessel new {log}, which writes "
+        f"{log}: no vessel profile fits this log, {listed}. Fix: draft one with ferryid vessel new {quote(log)}, which writes "
         "vessel.toml beside the log, or give --vessel a profile (TOML)"
     )
 
@@ -229,7 +230,8 @@ def named_profiles() -> tuple[dict[str, Profile], list[Match]]:
         try:
             profiles[name] = load_profile(name)
         except FerryIdError:
-            faulty.append(Match(name, problem=f"has a fault: see ferryid vessel check {user_folder() / name}.toml"))
+            file = quote(f"{user_folder() / name}.toml")
+            faulty.append(Match(name, problem=f"has a fault: see ferryid vessel check {file}"))
     return profiles, faulty
 
 

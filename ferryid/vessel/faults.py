@@ -162,6 +162,9 @@ class TableReader:
                 f'"{key}" must be an array of finite numbers, found {_kind(value)}. Fix: {key} = [1.0, 2.0]', key
             )
             return ()
+        if count is None and not value:
+            self.fault(f'"{key}" is an empty array. Fix: {key} = [1.0, 2.0]', key)
+            return ()
         if count is not None and len(value) != count:
             self.fault(f'"{key}" must hold {counted(count, "number")}, found {len(value)}. Fix: give {count}', key)
             return ()

@@ -10,12 +10,13 @@ import tomllib
 from functools import lru_cache
 from importlib import resources
 from pathlib import Path
+from shlex import quote
 
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.ingest.log import TableLayout
 from ferryid.vessel.faults import Fault, TableReader
-from ferryid.vessel.parse_actuators import parse_actuators
+from ferryid.vessel.parse_actuators import parse_actuators, with_curve
 from ferryid.vessel.parse_hull import parse_hull, parse_wind
 from ferryid.vessel.parse_signals import parse_signals
 from ferryid.vessel.profile import SETTINGS, Profile
@@ -78,7 +79,7 @@ def parse_profile(text: str, where: str) -> Profile:
     if profile is None or errors:
         first = errors[0]
         more = len(errors) - 1
-        others = f" ({counted(more, 'more fault')}: see ferryid vessel check {where})" if more else ""
+        others = f" ({counted(more, 'more fault')}: see ferryid vessel check {quote(where)})" if more else ""
         raise FerryIdError(f"{where}:{first.line}: {first.message}{others}")
     return profile
 
@@ -161,7 +162,7 @@ def _parse(text: str, where: str) -> tuple[Profile | None, list[Fault]]:
     actuators = parse_actuators(top, hull)
     table = _parse_table(top.table("table"))
     signals = parse_signals(
-        top.table("signals", required=True, needs="so nothing of a log can be used"), actuators, faults
+        top.table("signals", required=True, needs="so nothing of a log can be used"), actuators, faults, with_curve(top)
     )
     top.close()
     faults.sort(key=lambda fault: fault.line)

@@ -46,6 +46,13 @@ def parse_actuators(top: TableReader, hull: Hull | None) -> tuple[Actuator, ...]
     return tuple(actuators)
 
 
+def with_curve(top: TableReader) -> frozenset[str]:
+    """Return the names of the actuators for which the file gives a thrust curve, right or wrong."""
+    given = top.data.get("actuator")
+    entries = given if isinstance(given, list) else []
+    return frozenset(str(one.get("name")) for one in entries if isinstance(one, dict) and "thrust" in one)
+
+
 def _actuator(reader: TableReader) -> Actuator:
     name = reader.text("name", required=True)
     if name and not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from ferryid.vessel.dimensions import WATER_DENSITY
 from ferryid.vessel.faults import LARGEST, TableReader
 from ferryid.vessel.profile import Hull, WindAreas
 
@@ -69,7 +70,61 @@ def parse_hull(reader: TableReader | None) -> Hull | None:
     reader.close()
     if not math.isnan(length_m) and abs(x_g_m) > length_m:
         reader.fault(f'"x_g_m" = {x_g_m:g} lies outside a hull of {length_m:g} m', "x_g_m")
+    _check_size(reader, length_m, beam_m, draught_m, mass_kg)
+    _check_gyration(reader, length_m, beam_m, inertia_z / mass_kg - x_g_m**2)
     return Hull(length_m, beam_m, draught_m, mass_kg, inertia_z, x_g_m, total, damping, spread)
+
+
+def _check_size(reader: TableReader, length_m: float, beam_m: float, draught_m: float, mass_kg: float) -> None:
+    """Note a hull that is broader or deeper than long, and a mass that it cannot carry; comparisons with NaN are false."""
+    for key, size in (("beam_m", beam_m), ("draught_m", draught_m)):
+        if size > length_m:
+            reader.fault(
+                f'"{key}" = {size:g} is more than the length of {length_m:g} m. Fix: check both and their units',
+                key,
+                warning=True,
+            )
+    remedy = "Fix: give mass_kg in kg (1 t is 1000 kg), or correct the dimensions"
+    cube_kg = WATER_DENSITY * length_m**3
+    # Where the draught is not given, no hull draws more than it is wide.
+    depth_m = beam_m if math.isnan(draught_m) else draught_m
+    box_kg = WATER_DENSITY * length_m * beam_m * depth_m
+    if mass_kg > cube_kg:
+        reader.fault(
+            f'"mass_kg" = {mass_kg:g} cannot float: a cube of water as long as the hull, {length_m:g} m, has '
+            f"{cube_kg:.3g} kg. {remedy}",
+            "mass_kg",
+        )
+    elif mass_kg > box_kg:
+        reader.fault(
+            f'"mass_kg" = {mass_kg:g} is more than the water in a box around the hull, {length_m:g} m long, '
+            f"{beam_m:g} m wide and {depth_m:g} m deep: {box_kg:.3g} kg. {remedy}",
+            "mass_kg",
+            warning=True,
+        )
+
+
+def _check_gyration(reader: TableReader, length_m: float, beam_m: float, square_m2: float) -> None:
+    """Note a radius of gyration, whose square is given, that no distribution of the mass over the hull has."""
+    if not square_m2 > 0.0:
+        return
+    radius_m = math.sqrt(square_m2)
+    key = "k_zz_m" if reader.has("k_zz_m") else "inertia_z"
+    corner_m = 0.5 * math.hypot(length_m, length_m if math.isnan(beam_m) else beam_m)
+    shown = (
+        f'"{key}" = {radius_m:g}'
+        if key == "k_zz_m"
+        else f'"{key}" means a radius of gyration of {radius_m:.3g} m, which'
+    )
+    remedy = "Fix: check it and its unit; it is typically a quarter of the length"
+    if radius_m > length_m:
+        reader.fault(f"{shown} is more than the length of {length_m:g} m, which cannot be. {remedy}", key)
+    elif radius_m > corner_m:
+        reader.fault(
+            f"{shown} is farther from the middle than any corner of the hull, {corner_m:.3g} m. {remedy}",
+            key,
+            warning=True,
+        )
 
 
 def _spread(reader: TableReader) -> float:

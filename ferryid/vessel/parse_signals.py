@@ -27,9 +27,12 @@ _OPTIONAL = ("wind", "current", "payload", "tau_d", "position_d", "heading_d", "
 
 
 def parse_signals(
-    reader: TableReader | None, actuators: tuple[Actuator, ...], faults: list[Fault]
+    reader: TableReader | None, actuators: tuple[Actuator, ...], faults: list[Fault], with_curve: frozenset[str]
 ) -> tuple[Signal, ...]:
-    """Read every ``[signals.<quantity>]``, noting faults, what the map lacks and where it contradicts itself."""
+    """Read every ``[signals.<quantity>]``, noting faults, what the map lacks and where it contradicts itself.
+
+    Of the actuators in `with_curve` it is known already what is wrong with a thrust curve that cannot be used.
+    """
     if reader is None:
         return ()
     by_name = {actuator.name: actuator for actuator in actuators}
@@ -48,7 +51,7 @@ def parse_signals(
             signals.append(signal)
             _check_own_fields(table, signal, read)
     if len(faults) == before:
-        _check_complete(reader, signals, actuators)
+        _check_complete(reader, signals, actuators, with_curve)
     return tuple(signals)
 
 
@@ -322,7 +325,9 @@ def _role(rest: str) -> str:
     return rest.removesuffix(".command")
 
 
-def _check_complete(reader: TableReader, signals: list[Signal], actuators: tuple[Actuator, ...]) -> None:
+def _check_complete(
+    reader: TableReader, signals: list[Signal], actuators: tuple[Actuator, ...], with_curve: frozenset[str]
+) -> None:
     """Note what the map lacks as a whole, and frames that contradict each other."""
     mapped = {signal.quantity: signal for signal in signals}
     if "velocity" not in mapped and not {"position", "heading"} <= set(mapped):
@@ -369,10 +374,12 @@ def _check_complete(reader: TableReader, signals: list[Signal], actuators: tuple
             "yaw_rate",
         )
     for actuator in actuators:
-        _check_actuator(reader, mapped, actuator)
+        _check_actuator(reader, mapped, actuator, with_curve)
 
 
-def _check_actuator(reader: TableReader, mapped: dict[str, Signal], actuator: Actuator) -> None:
+def _check_actuator(
+    reader: TableReader, mapped: dict[str, Signal], actuator: Actuator, with_curve: frozenset[str]
+) -> None:
     for roles in needed_roles(actuator):
         names = [f"{actuator.name}.{role}{order}" for role in roles for order in ("", ".command")]
         given = [name for name in names if name in mapped]
@@ -382,7 +389,7 @@ def _check_actuator(reader: TableReader, mapped: dict[str, Signal], actuator: Ac
                 f'Fix: map [signals."{actuator.name}.{roles[0]}"], or its ".command" where there is no feedback'
             )
         by_speed = [name for name in given if f"{actuator.name}.speed" in name]
-        if by_speed and actuator.thrust is None:
+        if by_speed and actuator.thrust is None and actuator.name not in with_curve:
             reader.fault(
                 f"{actuator.name} has a speed signal but no thrust curve. Fix: add thrust = {{ ... }} to the actuator",
                 by_speed[0],

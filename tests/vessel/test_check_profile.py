@@ -112,6 +112,19 @@ CASES = {
         "x_g_m = 2.0\ninertia_z = 2000.0@",
         "must exceed",
     ),
+    "radius of gyration beyond the length": ("inertia_z = 2000.0", "k_zz_m = 5.5@", "is more than the length of 5 m"),
+    "inertia in other units": (
+        "inertia_z = 2000.0",
+        "inertia_z = 2e6@",
+        "means a radius of gyration of 44.7 m, which is more than the length of 5 m",
+    ),
+    "mass in other units": (
+        "mass_kg = 1000.0\ninertia_z = 2000.0",
+        "mass_kg = 1e6@\nk_zz_m = 1.2",
+        "cannot float: a cube of water as long as the hull, 5 m, has 1.25e+05 kg",
+    ),
+    "negative draught": ("length_m = 5.0\nmass", "length_m = 5.0\ndraught_m = -0.5@\nmass", "must be above 0"),
+    "no draught": ("length_m = 5.0\nmass", "length_m = 5.0\ndraught_m = 0@\nmass", "must be above 0"),
     "centre of gravity off the hull": (
         "mass_kg = 1000.0",
         "x_g_m = 6.0@\nmass_kg = 10.0",
@@ -293,6 +306,11 @@ CASES = {
         "",
         'left is of kind "azimuth" and has no angle signal',
     ),
+    "curve of an empty list": (
+        'kind = "table"\nspeed = [-900, 0, 900]\nforce = [-200, 0, 300]',
+        'kind = "open_water"\nJ = []@\nK_T = [0.3, 0.0]',
+        '"J" is an empty array',
+    ),
     "speed without curve": (
         'thrust = { kind = "polynomial", coefficients = [0.01, 0.0, 1e-7], valid = [-900, 900] }\n',
         "",
@@ -403,6 +421,39 @@ def test_every_fault_is_found_at_once(tmp_path: Path) -> None:
 def test_warnings_do_not_keep_a_profile_from_loading() -> None:
     profile = parse_profile(SOUND.replace('"X_u" = -20.0', '"X_u" = 20.0'), "boat.toml")
     assert profile.hull.D["X_u"] == 20.0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("inertia_z = 2000.0", "k_zz_m = 4.0", "farther from the middle than any corner of the hull, 3.54 m"),
+        (
+            "mass_kg = 1000.0",
+            "beam_m = 2.0\ndraught_m = 0.05\nmass_kg = 1000.0",
+            "is more than the water in a box around the hull, 5 m long, 2 m wide and 0.05 m deep: 500 kg",
+        ),
+        ("mass_kg = 1000.0", "beam_m = 0.4\nmass_kg = 1000.0", "5 m long, 0.4 m wide and 0.4 m deep: 800 kg"),
+        ("mass_kg = 1000.0", "beam_m = 60.0\nmass_kg = 1000.0", '"beam_m" = 60 is more than the length of 5 m'),
+        ("mass_kg = 1000.0", "draught_m = 30.0\nmass_kg = 1000.0", '"draught_m" = 30 is more than the length of 5 m'),
+    ],
+)
+def test_an_implausible_hull_is_warned_of(tmp_path: Path, old: str, new: str, told: str) -> None:
+    path = tmp_path / "boat.toml"
+    path.write_text(SOUND.replace(old, new, 1))
+    (fault,) = [fault for fault in check_profile(path) if told in fault.message]
+    assert fault.warning
+    assert "Fix:" in fault.message
+    assert load_profile(path).name == "boat"
+
+
+def test_a_faulty_curve_is_not_said_to_be_missing(tmp_path: Path) -> None:
+    path = tmp_path / "boat.toml"
+    curve = 'kind = "table"\nspeed = [-900, 0, 900]\nforce = [-200, 0, 300]'
+    path.write_text(SOUND.replace(curve, 'kind = "open_water"\nJ = []\nK_T = []'))
+    assert [fault.message.partition(".")[0] for fault in check_profile(path)] == [
+        '"J" is an empty array',
+        '"K_T" is an empty array',
+    ]
 
 
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:
