@@ -359,7 +359,10 @@ def _file_for_folder(path: Path) -> Path | None:
 def no_folder(path: Path, by: str = "--out") -> UnwritableError:
     """Return the error for a place where a folder was to be and something else is, `by` the option that names another."""
     what = "file" if path.is_file() else "link to nothing" if path.is_symlink() else "special file"
-    return UnwritableError(f"{path}: is a {what}, and a folder was to be there. Fix: name another place with {by}")
+    return UnwritableError(
+        f"{path}: is a {what}, and a folder was to be there, so that results cannot be written. "
+        f"Fix: name another place with {by}"
+    )
 
 
 def check_folder(path: Path) -> None:

@@ -52,7 +52,8 @@ def test_a_full_disk_is_told_with_a_remedy(tmp_path: Path) -> None:
 def test_a_file_in_the_place_of_the_folder_is_told(tmp_path: Path) -> None:
     (tmp_path / "out").write_text("a file", encoding="utf-8")
     with pytest.raises(
-        FerryIdError, match=f"^{tmp_path / 'out'}: is a file, and a folder was to be there. Fix: .* with --file"
+        FerryIdError,
+        match=f"^{tmp_path / 'out'}: is a file, and a folder was to be there, .* cannot be written. Fix: .* with --file",
     ):
         write_text(tmp_path / "out" / "deeper" / "model.json", "x", by="--file")
 

@@ -239,7 +239,8 @@ def test_every_output_folder_that_is_a_file_is_told_alike(
         run = ferryid(*(fixtures / word if word == "short.bag" else word for word in command), "--out", out)
         refused(
             run,
-            f"ferryid: {tmp_path / 'out'}: is a file, and a folder was to be there. Fix: name another place with --out",
+            f"ferryid: {tmp_path / 'out'}: is a file, and a folder was to be there, so that results cannot be written. ",
+            "Fix: name another place with --out",
         )
 
 
