@@ -20,7 +20,11 @@ def test_notes_that_differ_in_numbers_only_are_one_line_with_their_range() -> No
 
 
 def test_names_and_dates_are_no_numbers() -> None:
-    notes = [("a", "thruster1 began on 2026-11-29."), ("b", "thruster2 began on 2026-11-29."), ("c", "It is 12:30 in v1.2.")]
+    notes = [
+        ("a", "thruster1 began on 2026-11-29."),
+        ("b", "thruster2 began on 2026-11-29."),
+        ("c", "It is 12:30 in v1.2."),
+    ]
     assert said_once(notes) == [f"{log}: {note}" for log, note in notes]
 
 
