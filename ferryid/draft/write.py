@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 from ferryid.counts import counted
@@ -154,8 +155,8 @@ def as_text(draft: Draft, file: str, text: str) -> str:
     # A profile can do without the areas that a wind acts on.
     wind = " (those of [wind] only if a wind is to be tested)" if f"{MARK} [wind]" in text else ""
     todo = f"fill in {counted(count, 'line')} marked {mark}{wind}, then " if count else ""
-    steps = [f"ferryid {verb} {draft.log} --vessel {file}" for verb in ("inspect", "fit")]
-    lines.append(f"next    {todo}ferryid vessel check {file}, {', '.join(steps)}")
+    steps = [f"ferryid {verb} {quote(draft.log)} --vessel {quote(file)}" for verb in ("inspect", "fit")]
+    lines.append(f"next    {todo}ferryid vessel check {quote(file)}, {', '.join(steps)}")
     return "\n".join(lines)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import exp, hypot, isfinite, log
 from pathlib import PurePath
+from shlex import quote
 
 from ferryid.counts import counted
 from ferryid.diagnose import JUDGING, UNKNOWN, Diagnosis, Estimate, Finding, worse_axes
@@ -372,7 +373,7 @@ def new_model(diagnosis: Diagnosis) -> str:
     path = PurePath(diagnosis.model)
     label = f"{path.parent.name}@{path.stem}"
     out = path.parents[2] if len(path.parents) > 2 else PurePath(USUAL_OUT)
-    where = "" if out == PurePath(USUAL_OUT) else f" --out {out}"
+    where = "" if out == PurePath(USUAL_OUT) else f" --out {quote(str(out))}"
     learned = diagnosis.learned
     alone = learned is not None and (diagnosis.posterior is None or learned.fit_alone)
     what = "The model that was learned is" if alone else "The model with the findings is"

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ MOST_CHANGES = 10
 def render_listing(result: dict[str, Any], out: Path) -> str:
     """Return the list as text."""
     if not result["models"]:
-        return f"no models under {out}. Make one with: ferryid fit LOG --vessel PROFILE --out {out}"
+        return f"no models under {out}. Make one with: ferryid fit LOG --vessel PROFILE --out {quote(str(out))}"
     lines = [f"  {'model':<28}{'verdict':<12}{'MSE/base':>9}  {'created':<22}trained on"]
     for model in result["models"]:
         mark = "*" if model["current"] else " "

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import io
+import re
 import shutil
 import sys
 from pathlib import Path
+from shlex import split
 
 import pytest
 
@@ -52,6 +54,23 @@ def test_without_a_person_lines_are_marked(ferryid, log: Path) -> None:
     run = ferryid("fit", log)
     assert run.code == 2
     assert "vessel.toml:" in run.err
+
+
+def test_commands_that_come_next_quote_their_paths(ferryid, log: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "first day's trial"
+    folder.mkdir()
+    own = folder / log.name
+    own.write_bytes(log.read_bytes())
+    run = ferryid("vessel", "new", own)
+    assert run.code == 0, run.err
+    (line,) = [line for line in run.out.splitlines() if line.startswith("next ")]
+    profile = folder / "vessel.toml"
+    commands = [split(one) for one in re.split(r"(?:, | then )(?=ferryid)", line)[1:]]
+    assert commands == [
+        ["ferryid", "vessel", "check", str(profile)],
+        ["ferryid", "inspect", str(own), "--vessel", str(profile)],
+        ["ferryid", "fit", str(own), "--vessel", str(profile)],
+    ]
 
 
 def test_a_draft_to_standard_output_is_toml_alone(ferryid, log: Path) -> None:
