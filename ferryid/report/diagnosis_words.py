@@ -56,6 +56,8 @@ def title(effect: str, instance: str | None = None) -> str:
 
 UNRECORDED = "unrecorded_force"
 """A force that the records of the actuators lack: no fault of a sensor, and nothing that could be corrected."""
+NOT_CORRECTED = "not corrected"
+"""What the sentence of a sensor fault says that is told and left as it is, as a clock offset in a short log."""
 APART = 0.1
 """Share of the squared force error by which a finding alone may remove more than all do, before the headline says why."""
 
@@ -64,17 +66,27 @@ def _of_sensor(finding: Finding) -> bool:
     return finding.effect not in effects() and finding.effect != UNRECORDED
 
 
+def _faults(findings: Sequence[Finding], names: Sequence[str]) -> list[str]:
+    """Return which faults the sensors have, those that are corrected here apart from those that are not, as a clause."""
+    corrected = [name for one, name in zip(findings, names, strict=True) if NOT_CORRECTED not in one.says]
+    left = [name for one, name in zip(findings, names, strict=True) if NOT_CORRECTED in one.says]
+    parts = [f"corrected here: {listed(list(dict.fromkeys(corrected)))}"] if corrected else []
+    parts += [f"not corrected here: {listed(list(dict.fromkeys(left)))}"] if left else []
+    return [f"sensors have faults, {', and '.join(parts)}"] if parts else []
+
+
 def headline(diagnosis: Diagnosis) -> str:
     """Return the verdict in one sentence."""
     every = [one for one in diagnosis.findings if one.effect != UNKNOWN]
     named = [one for one in every if one.sure]
     doubtful = listed([_inline(title(one.effect, one.instance)) for one in every if one not in named])
     physics = [_sure_name(one) for one in named if one.effect in effects()]
-    sensors = [_inline(title(one.effect)) for one in named if _of_sensor(one)]
+    faulty = [one for one in named if _of_sensor(one)]
+    sensors = _faults(faulty, [_inline(title(one.effect)) for one in faulty])
     base = "simulation" if diagnosis.against else "model"
     left_out = "the recording differs from the simulation in" if diagnosis.against else "the model left out"
     parts = [f"{left_out} {listed(physics)}"] if physics else []
-    parts += [f"the sensors have faults, corrected here: {listed(sensors)}"] if sensors else []
+    parts += [f"the {told}" for told in sensors]
     parts += ["a force acted that was not recorded"] if any(one.effect == UNRECORDED for one in named) else []
     names = "; ".join(parts) + (f"; perhaps also {doubtful}" if doubtful else "")
     removed = {axis: 1.0 - ratio.value for axis, ratio in ratio_of(diagnosis).items()}
@@ -400,7 +412,8 @@ def summary(diagnoses: Sequence[Diagnosis]) -> str:
     named = [one for one in every if one.effect != UNKNOWN]
     # Sizes differ from log to log.
     sure = list(dict.fromkeys(_sure_name(one, sizes=False) for one in named if one.sure and one.effect in effects()))
-    sensors = dict.fromkeys(_sure_name(one, sizes=False) for one in named if one.sure and _of_sensor(one))
+    faulty = [one for one in named if one.sure and _of_sensor(one)]
+    sensors = _faults(faulty, [_sure_name(one, sizes=False) for one in faulty])
     unrecorded = sum(any(one.sure and one.effect == UNRECORDED for one in each.findings) for each in diagnoses)
     doubtful = dict.fromkeys(_inline(title(one.effect, one.instance)) for one in named if not one.sure)
     known = {_inline(name) for one in named if one.sure for name in _called(one)}
@@ -408,8 +421,7 @@ def summary(diagnoses: Sequence[Diagnosis]) -> str:
     parts = [f"Of {counted(len(diagnoses), 'log')}, {listed(counts)}."]
     if sure:
         parts.append(f"The model left out {listed(sure)}.")
-    if sensors:
-        parts.append(f"The sensors have faults, corrected here: {listed(list(sensors))}.")
+    parts += [f"The {told}." for told in sensors]
     if unrecorded:
         parts.append(f"In {unrecorded} of them a force acted that was not recorded.")
     if perhaps:

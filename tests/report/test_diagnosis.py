@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import re
 from dataclasses import replace
@@ -18,6 +19,7 @@ import numpy as np
 import pytest
 
 from ferryid import __version__
+from ferryid.diagnose.checks import clock_offset
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.spectra import Band
 from ferryid.diagnose.judging.credibility import HullChange as Moved
@@ -36,6 +38,7 @@ from ferryid.report.diagnosis_figures import _profile, binned, in_regime
 from ferryid.report.diagnosis_page import as_text, render
 from ferryid.report.diagnosis_report import as_json, patient, report
 from ferryid.report.diagnosis_words import (
+    NOT_CORRECTED,
     about_errors,
     changed,
     estimate,
@@ -43,6 +46,7 @@ from ferryid.report.diagnosis_words import (
     numbers,
     rivals,
     said,
+    summary,
     trust,
     where,
 )
@@ -250,6 +254,21 @@ def test_a_verdict_is_told_with_what_changed() -> None:
         "with them, the squared force error on held-out data falls by 75 % in surge, 90 % in sway and 95 % in yaw."
     )
     assert headline(diagnosis("matched")).startswith("Matched: nothing")
+
+
+def test_the_verdict_does_not_call_a_fault_corrected_that_is_left_as_it_is() -> None:
+    assert NOT_CORRECTED in inspect.getsource(clock_offset.find)
+    offset = replace(wind(), effect="clock_offset", unresolved_with=(), says="Position lags velocity by 0.21 s.")
+    left = replace(offset, says=f"{offset.says} It is not corrected in so short a log.")
+    held = replace(offset, effect="held_samples")
+    for findings, told in (
+        ((offset,), "sensors have faults, corrected here: clock offset"),
+        ((left,), "sensors have faults, not corrected here: clock offset"),
+        ((held, left), "sensors have faults, corrected here: held samples, and not corrected here: clock offset"),
+    ):
+        one = replace(diagnosis("explained"), findings=findings)
+        assert f"the {told}" in headline(one)
+        assert f"The {told}." in summary([one, replace(one, log="other")])
 
 
 def test_the_verdict_says_why_all_findings_remove_less_than_one_of_them_alone() -> None:
