@@ -17,6 +17,7 @@ from ferryid.models.scores import ForceScores, ModelScores
 from ferryid.models.store.listing import list_versions
 from ferryid.models.store.versions import StoredModel, list_models, load, load_file, save
 from ferryid.regression.bases.basis import make_basis
+from ferryid.report import model_text
 from ferryid.report.model_text import render_listing, render_model
 from ferryid.vessel import load_profile
 
@@ -242,6 +243,17 @@ def test_a_model_is_shown_by_its_equations_of_motion_beside_the_base_model() -> 
     assert float(value) - float(base) == pytest.approx(added, rel=1e-3, abs=0.1)
     assert float(change) == pytest.approx(100.0 * added / float(base), abs=0.06)
     assert lines.index(row) < next(k for k, line in enumerate(lines) if line.startswith("term "))
+
+
+def test_a_coefficient_that_is_nothing_but_rounding_is_shown_as_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = dict(model_text.equation_coefficients(made()))
+    m22 = float(found["m22"][0])
+    found["m23"], found["m32"] = np.array([1e-3 * m22, -1.0, 1.0]), np.array([1e-18 * m22, -1.0, 1.0])
+    monkeypatch.setattr(model_text, "equation_coefficients", lambda model: found)
+    lines = render_model(made()).splitlines()
+    value = {line.split()[0]: line.split()[1] for line in lines if line.startswith("m") and len(line.split()) > 5}
+    assert float(value["m23"]) == pytest.approx(1e-3 * m22, rel=1e-3)
+    assert value["m32"] == "0"
 
 
 def test_a_model_without_a_correction_has_no_table_of_one() -> None:
