@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import isfinite
+from math import isfinite, pi, tau
 from typing import Any
 
 from ferryid.diagnose import Diagnosis, Estimate, error_ratio
@@ -77,7 +77,10 @@ def free_run_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
         one, other = (_number(run[key][k]) * factor if run.get(key) else float("nan") for run in (before, after))
         ratio = _estimated(given) if given else _bare(other / one if one > 0.0 else float("nan"))
         rows.append(
-            {"name": f"{name} after {horizons[k]:.3g} s [{unit}]", "cells": [_cell(one), _cell(other), _ratio(ratio)]}
+            {
+                "name": f"{name} after {horizons[k]:.3g} s [{unit}]",
+                "cells": [*(_turned(key, each / factor, _cell(each)) for each in (one, other)), _ratio(ratio)],
+            }
         )
     return rows
 
@@ -104,6 +107,11 @@ def _cell(value: float | None, *, root: bool = False) -> str:
     if not isfinite(number):
         return "–"
     return f"{number**0.5 if root else number:.3g}"
+
+
+def _turned(key: str, value: float, cell: str) -> str:
+    """Return the cell of an error with turns beside it where a free run has turned by more than half of one too many."""
+    return f"{cell} ({value / tau:.1f} turns)" if key == "heading_rad" and value > pi else cell
 
 
 def _ratio(one: Estimate | None) -> str:

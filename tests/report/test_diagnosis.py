@@ -271,6 +271,15 @@ def test_the_verdict_does_not_call_a_fault_corrected_that_is_left_as_it_is() -> 
         assert f"The {told}." in summary([one, replace(one, log="other")])
 
 
+def test_a_free_run_that_turned_too_often_is_told_in_turns() -> None:
+    before, after = (
+        {"free_run": {"horizons_s": [60.0], "heading_rad": [value], "position_m": [40.0]}} for value in (16.7, 0.1)
+    )
+    position, heading = free_run_rows(replace(diagnosis("explained"), before=before, after=after))
+    assert heading["cells"][:2] == ["957 (2.7 turns)", "5.73"]
+    assert position["cells"][:2] == ["40", "40"]
+
+
 def test_the_verdict_says_why_all_findings_remove_less_than_one_of_them_alone() -> None:
     """A hull that is refitted without the findings makes up for some of them."""
     made = diagnosis("explained")
