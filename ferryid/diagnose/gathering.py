@@ -13,7 +13,7 @@ from ferryid.diagnose.checks.screening import screen_sensors, screen_together
 from ferryid.diagnose.data.measurements import measure_log
 from ferryid.diagnose.data.simulated import simulated
 from ferryid.diagnose.inference.campaign import assemble, repeated
-from ferryid.diagnose.inference.sessions import dated, in_time, start_ns
+from ferryid.diagnose.inference.sessions import in_time, start_ns
 from ferryid.diagnose.inference.stages import AveragedLog, average
 from ferryid.diagnose.judging.campaign_split import Split, find_split
 from ferryid.diagnose.judging.diagnosis import distinct
@@ -21,6 +21,7 @@ from ferryid.effects.wording import listed
 from ferryid.errors import FerryIdError
 from ferryid.models import Model
 from ferryid.side_by_side import over
+from ferryid.signals.order_of_time import dated
 from ferryid.types import RunContext
 from ferryid.vessel.profile import Profile
 
@@ -171,7 +172,7 @@ def _simulated(log: AveragedLog) -> str:
 
 def _clocks(logs: Sequence[AveragedLog]) -> tuple[str, ...]:
     """Return sentences on clocks that some logs did not set, and on times that overlap: no vessel makes two logs at once."""
-    unset = [one.path for one in logs if not dated(one)]
+    unset = [one.path for one in logs if not dated(start_ns(one))]
     return (*(_unset(unset) if len(unset) < len(logs) else ()), *_overlapping(logs))
 
 
@@ -188,7 +189,9 @@ def _unset(paths: Sequence[str]) -> tuple[str, ...]:
 
 def _overlapping(logs: Sequence[AveragedLog]) -> tuple[str, ...]:
     """Return a sentence on logs whose times overlap."""
-    spans = sorted((start_ns(one), start_ns(one) + round(_seconds(one) * 1e9), one.path) for one in logs if dated(one))
+    spans = sorted(
+        (start_ns(one), start_ns(one) + round(_seconds(one) * 1e9), one.path) for one in logs if dated(start_ns(one))
+    )
     overlapping = []
     for k, (_, end, path) in enumerate(spans):
         for start, other_end, other in spans[k + 1 :]:

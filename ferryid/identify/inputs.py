@@ -8,9 +8,9 @@ from pathlib import Path
 
 from ferryid.identify.settings import FitSettings
 from ferryid.signals.copies import GivenLogs
+from ferryid.signals.order_of_time import in_order
 from ferryid.signals.prepare import Opened, open_track
 from ferryid.signals.stream import compact
-from ferryid.signals.thresholds import SIGNALS
 from ferryid.types import RunContext
 from ferryid.vessel.profile import Profile
 
@@ -37,7 +37,4 @@ def read_logs(
         one = open_track(path, profile, run.tables, rate_hz=settings.rate_hz, verify=run.verify, ranges=run.ranges)
         given.add(one.recording)
         opened.append(one if whole else replace(one, recording=compact(one.recording)))
-    begins = [one.recording.start_ns for one in opened]
-    if min(begins, default=0) < SIGNALS.epoch_ns:
-        return opened
-    return [opened[i] for i in sorted(range(len(opened)), key=lambda i: begins[i])]
+    return [opened[i] for i in in_order([one.recording.start_ns for one in opened])]

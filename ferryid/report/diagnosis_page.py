@@ -22,6 +22,7 @@ from ferryid.report import (
     likeness,
     second_sources,
 )
+from ferryid.report.alike_notes import said_once
 from ferryid.report.campaign import TEXT_COLUMNS
 from ferryid.report.drawings import NONE, Drawings
 from ferryid.report.html import template
@@ -120,7 +121,7 @@ def _several_as_text(diagnoses: Sequence[Diagnosis]) -> str:
     if together and (instruments := second_sources.lines(together)):
         blocks.append("\n".join(_folded(line) for line in instruments))
     unused = [one for one in diagnoses if one.verdict == "not_testable"]
-    if why := [f"{one.log}: {note}" for one in unused for note in diagnosis_words.notes_of(one, shared)]:
+    if why := said_once([(one.log, note) for one in unused for note in diagnosis_words.notes_of(one, shared)]):
         blocks.append("\n".join(_folded(line) for line in why))
     tested = [one for one in diagnoses if one not in unused]
     blocks.append(_folded(campaign.left_to_the_page(tested, shared)))

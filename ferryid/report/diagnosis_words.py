@@ -292,7 +292,7 @@ def rivals(finding: Finding) -> list[str]:
     lines = []
     if finding.unresolved_with:
         names = listed([_inline(one) for name in finding.unresolved_with for one in _meant(finding, name)], "or")
-        lines.append(f"This log cannot distinguish it from {names}.")
+        lines.append(f"These data cannot distinguish it from {names}.")
     # Another shape of the same thrust curve may be unresolved though the evidence is clear.
     alike = [
         one

@@ -24,12 +24,15 @@ def cross_checks(track: Track) -> tuple[Doubt, ...]:
     """Return kinematic contradictions: yaw rate against heading, velocity against position.
 
     Changes over two seconds are compared with the integrals of the rates, so that no noisy derivative is formed.
-    Certain are those in which both follow each other closely and yet differ in sign or by the factor of a unit.
+    Certain are those in which both follow each other closely and yet differ in sign or by the factor of a unit. A rudder
+    that is often across the hull is certainly wrong too.
     Nothing is corrected here.
     """
     columns = track.columns
     span = max(2, round(SIGNALS.gain_span_s * track.rate_hz))
-    said: list[Doubt] = []
+    said = [
+        doubt for name in columns if name.startswith("delta_") for doubt in _rudder(name, columns[name][track.valid])
+    ]
     if "psi" in columns and "r" in columns:
         turned = _changes("psi", np.diff(columns["psi"]), columns["r"], track, span)
         said += _compare("yaw rate", "heading", turned, SIGNALS.least_turn_rad, _YAW_RATE_GAINS)
@@ -48,6 +51,24 @@ def cross_checks(track: Track) -> tuple[Doubt, ...]:
             speeds = [Doubt(says, True, frame)] if says else speeds
         said += speeds
     return tuple(said)
+
+
+def _rudder(name: str, angle: Floats) -> list[Doubt]:
+    """Return the doubt of an angle [rad] that is beyond a right angle for a good part of the log, which no rudder is."""
+    # Those counted from 0 to 360 deg are no more than a turn.
+    turned = np.minimum(np.abs(angle), np.abs(2.0 * np.pi - np.abs(angle)))
+    beyond = turned > 0.5 * np.pi
+    if np.count_nonzero(beyond) <= SIGNALS.rudder_share * angle.size:
+        return []
+    actuator = name.removeprefix("delta_").removeprefix("cmd_")
+    signal = f'[signals."{actuator}.rudder{".command" if name.startswith("delta_cmd_") else ""}"]'
+    far = float(np.abs(angle).max())
+    says = (
+        f"{name} is further than 90 deg off the centreline in {100.0 * beyond.mean():.0f} % of the log, which no rudder is "
+        f"(up to {far:.3g} rad)."
+    )
+    degrees = far > 2.0 * np.pi
+    return [Doubt(says, True, f'set unit = "deg" in {signal}' if degrees else f"check unit and offset in {signal}")]
 
 
 _YAW_RATE_GAINS = (

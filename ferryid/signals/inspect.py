@@ -26,10 +26,10 @@ from ferryid.signals.data_quality import (
     stream_quality,
 )
 from ferryid.signals.faults import find_faults
+from ferryid.signals.order_of_time import dated
 from ferryid.signals.prepare import track_of
 from ferryid.signals.recording import log_name, make_recording, selected
 from ferryid.signals.render import render_inspect
-from ferryid.signals.thresholds import SIGNALS
 from ferryid.signals.time_ranges import RangeError, cut
 from ferryid.signals.track import LeftOut
 from ferryid.types import TimeRanges
@@ -303,6 +303,6 @@ def _size(path: Path) -> int:
 
 def _clock_time(time_ns: int) -> str | None:
     """A time since 1970 as ISO 8601 in UTC; None for one that is counted from the start of a log."""
-    if time_ns < SIGNALS.epoch_ns:
+    if not dated(time_ns):
         return None
     return f"{np.datetime64(time_ns, 'ns')}Z"

@@ -88,6 +88,8 @@ def single_rows(recording: Recording) -> str:
 
 def _remedy(recording: Recording, lead: Stream, period_s: float) -> str:
     is_table = any(topic.encoding == "table" and topic.name == lead.topic for topic in recording.topics)
+    if lead.clock.resets:
+        return f"sort the rows by time, which goes back {counted(lead.clock.resets, 'time')}"
     if is_table:
         for unit, name, scale in _UNITS:
             if SIGNALS.lowest_usual_hz <= scale / period_s <= SIGNALS.highest_usual_hz:

@@ -105,10 +105,10 @@ class SignalThresholds:
         2000.0, "Hz", "highest rate that another unit of time must give", "convention: rates at which logs are recorded"
     )
     epoch_ns: int = threshold(
-        10**17,
+        946_684_800 * 10**9,
         "ns",
-        "earlier times count from the start of the log, not from 1970",
-        "derived: March 1973, before any log, and three years, beyond any log's length",
+        "earlier times count from the start of the log or are of a clock that was not set",
+        "derived: the year 2000, after the dates at which clocks begin (1970, 1980) and before any log",
     )
     position_step_m: float = threshold(
         1.0,
@@ -381,6 +381,12 @@ class SignalThresholds:
     )
     gain_error: float = threshold(
         0.05, "-", "a gain nearer to one is no contradiction", "convention: five per cent is a matter of calibration"
+    )
+    rudder_share: float = threshold(
+        0.05,
+        "of the rows",
+        "of a rudder beyond 90 degrees above which its angle is in another unit, or has an offset",
+        "convention: single wrong samples are fewer",
     )
     gain_quantile: float = threshold(
         0.995,

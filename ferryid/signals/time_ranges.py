@@ -12,9 +12,9 @@ import numpy as np
 
 from ferryid.errors import FerryIdError
 from ferryid.signals.empty_streams import without_empty
+from ferryid.signals.order_of_time import dated
 from ferryid.signals.source import on_change
 from ferryid.signals.stream import Recording, Stream
-from ferryid.signals.thresholds import SIGNALS
 from ferryid.types import Nanoseconds, TimeRange, TimeRanges
 from ferryid.vessel.profile import Profile
 
@@ -170,7 +170,7 @@ def _placed(log: str, whole: tuple[int, int], time: str | float | None, default:
         # Minus zero is the end.
         return (end if math.copysign(1.0, seconds) < 0.0 else start) + round(seconds * 1e9)
     date, clock = _date(text), _CLOCK.fullmatch(text)
-    if start < SIGNALS.epoch_ns and (date or clock):
+    if not dated(start) and (date or clock):
         raise RangeError(
             f"{log}: its times are counted from its start, so that {text} is at no place in it. "
             "Fix: give --from and --to in seconds"
@@ -255,7 +255,7 @@ def _relative(time_ns: int, start_ns: int) -> str:
 
 def _clock(start_ns: int, end_ns: int) -> str:
     """Return the clock times of a log's start and end in brackets; nothing for one whose times count from its start."""
-    if start_ns < SIGNALS.epoch_ns:
+    if not dated(start_ns):
         return ""
     first, last = (f"{np.datetime64(one // 10**9, 's')}Z" for one in (start_ns, end_ns))
     return f" ({first} to {last})"

@@ -8,7 +8,7 @@ from pathlib import Path
 import ferryid
 
 EVALUATION = (
-    *("report/", "reproduce/", "batch/", "schemas/", "cli/"),
+    *("report/", "reproduce/", "batch/", "draft/", "schemas/", "cli/"),
     *(
         "validation/campaign_oracle",
         "validation/estimate_errors",
@@ -24,7 +24,7 @@ EVALUATION = (
         "validation/transfer",
     ),
 )
-"""How the names of those begin that have no part in a log and its diagnosis: they only evaluate it, or draw, or print."""
+"""How the names of those begin that have no part in a log and its diagnosis: they evaluate, draw, print or draft profiles."""
 KINDS = (".py", ".toml")
 
 

@@ -175,7 +175,6 @@ NO_DECISION = {
         diagnose.inference.simulation_baseline SHOWN_ROWS
         diagnose.judging.error_profiles SECTORS SPEEDS PLACES TIMES
         diagnose.gathering SHOWN_OVERLAPS
-        diagnose.inference.sessions CLOCK_SET_NS
         diagnose.judging.findings SHOWN_RIVALS
         diagnose.judging.unexplained SPANS
         identify.archive MOST_DRAWN

@@ -238,7 +238,7 @@ def test_the_letter_has_its_order() -> None:
             wind().says,
             "North -3.02 m/s",
             "<svg",
-            "This log cannot distinguish it from current.",
+            "These data cannot distinguish it from current.",
             gain().says,
             "Current was not tested",
             "with over without",
@@ -350,12 +350,12 @@ def test_a_finding_is_told_in_numbers() -> None:
 def test_another_thruster_that_does_as_well_is_told_by_its_name() -> None:
     other = (Rival("thruster_gain", "thruster2", -1.0), Rival("thruster_gain", "bow", -9.0))
     told = rivals(replace(gain(), unresolved_with=("thruster_gain",), rivals=other))
-    assert told[0] == "This log cannot distinguish it from thruster force (thruster2)."
+    assert told[0] == "These data cannot distinguish it from thruster force (thruster2)."
 
 
 def test_rivals_are_told_by_how_much_less_likely_they_are() -> None:
     told = rivals(wind())
-    assert told[0] == "This log cannot distinguish it from current."
+    assert told[0] == "These data cannot distinguish it from current."
     # exp(4) is 54.6; exp(310) is 10 to the 134.6, which nobody needs to know.
     assert told[1] == "Of the other effects that were tried in its place, heading bias is 55 times less likely."
     assert told[2] == "Any other is less likely by a factor of more than a million: current would be next."
@@ -373,7 +373,7 @@ def test_another_shape_of_the_thrust_curve_is_unresolved_though_the_evidence_is_
         gain(), effect="thrust_saturation", instance="fore", unresolved_with=("ventilation",), rivals=others
     )
     told = rivals(limit)
-    assert told[0] == "This log cannot distinguish it from ventilation."
+    assert told[0] == "These data cannot distinguish it from ventilation."
     assert told[1].startswith("The evidence is against ventilation (fore), but that explains nearly as much")
     assert told[2].endswith("less likely by a factor of more than a million: inflow loss would be next.")
     assert "against" not in " ".join(rivals(replace(limit, unresolved_with=())))

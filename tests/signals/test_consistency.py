@@ -96,6 +96,29 @@ def test_a_turned_frame_is_not_of_the_wrong_hand() -> None:
     assert not any(doubt.certain for doubt in doubts if "mirrored" in doubt.says or "round" in doubt.says)
 
 
+@pytest.mark.parametrize(
+    ("name", "factor", "offset", "remedy"),
+    [
+        ("delta_main", np.degrees(1.0), 0.0, 'set unit = "deg" in [signals."main.rudder"]'),
+        ("delta_cmd_main", np.degrees(1.0), 0.0, 'set unit = "deg" in [signals."main.rudder.command"]'),
+        # Twenty radians are three turns and a right angle less.
+        ("delta_main", np.degrees(1.0), -40.0, 'set unit = "deg" in [signals."main.rudder"]'),
+        ("delta_main", 1.0, np.pi, 'check unit and offset in [signals."main.rudder"]'),
+        ("delta_main", 1.0, 2.0 * np.pi, ""),
+        ("delta_main", 1.0, 0.0, ""),
+        # A thruster turns all the way round.
+        ("alpha_main", np.degrees(1.0), 0.0, ""),
+    ],
+)
+def test_a_rudder_across_the_hull_is_named(name: str, factor: float, offset: float, remedy: str) -> None:
+    rudder = np.radians(20.0) * np.sin(0.2 * T) * factor + offset
+    said = cross_checks(voyage(**{name: rudder}))
+    assert [one.remedy for one in said if one.certain] == [remedy] * bool(remedy)
+    # Single wrong samples are no unit.
+    rudder = np.where(np.arange(T.size) % 25 == 0, 2.0, np.radians(20.0) * np.sin(0.2 * T))
+    assert cross_checks(voyage(delta_main=rudder)) == ()
+
+
 def test_a_yaw_rate_from_elsewhere_is_named() -> None:
     (finding,) = cross_checks(voyage(r=0.1 * np.sin(2.1 * T)))
     assert "does not follow the heading" in finding.says

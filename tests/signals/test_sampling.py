@@ -120,6 +120,13 @@ def test_a_file_of_a_folder_that_cannot_be_used_is_named_and_not_the_profile(
     assert (vessel["usable"], vessel["problem"]) == (False, str(error.value))
 
 
+def test_rows_out_of_order_are_not_taken_for_another_unit(tmp_path: Path, boat: Profile) -> None:
+    times = np.random.default_rng(1).permutation(2000) * 0.05
+    path = table(tmp_path, [f"{t:.2f}" for t in times])
+    with pytest.raises(FerryIdError, match=r"Fix: sort the rows by time, which goes back \d+ times$"):
+        prepare(path, boat, None, window_s=1.0)
+
+
 def test_a_log_of_one_sample_per_second_is_taken(tmp_path: Path, boat: Profile) -> None:
     prepared = prepare(table(tmp_path, [str(n) for n in range(300)]), boat, tmp_path / "out", window_s=1.0)
     assert "Smoothing: none, a window of 1 s holds one row at 1 Hz." in prepared.motion.repairs

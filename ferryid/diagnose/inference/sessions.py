@@ -6,9 +6,7 @@ from collections.abc import Sequence
 
 from ferryid.diagnose.inference.stages import AveragedLog
 from ferryid.diagnose.inference.thresholds import INFERENCE
-
-CLOCK_SET_NS = 946_684_800_000_000_000
-"""The year 2000: earlier times are those of clocks that were not set."""
+from ferryid.signals.order_of_time import dated, in_order
 
 
 def start_ns(log: AveragedLog) -> int:
@@ -16,15 +14,9 @@ def start_ns(log: AveragedLog) -> int:
     return log.screened.measured.survey.t0_ns
 
 
-def dated(log: AveragedLog) -> bool:
-    """Return whether the times of a log are dates."""
-    return start_ns(log) >= CLOCK_SET_NS
-
-
 def in_time(logs: Sequence[AveragedLog]) -> tuple[int, ...]:
-    """Return the places of logs in order of time; in the order in which they were given where some times are no dates."""
-    places = range(len(logs))
-    return tuple(sorted(places, key=lambda i: start_ns(logs[i])) if all(dated(one) for one in logs) else places)
+    """Return the places of logs in order of time, as `in_order` does."""
+    return in_order([start_ns(one) for one in logs])
 
 
 def sessions(logs: Sequence[AveragedLog]) -> tuple[int, ...]:
@@ -33,7 +25,7 @@ def sessions(logs: Sequence[AveragedLog]) -> tuple[int, ...]:
     A session ends where no log begins within `INFERENCE.session_gap_h` of the end of those before. A log without a date is
     near in time to no other, as far as is known: it is a session of its own.
     """
-    placed = [i for i, one in enumerate(logs) if dated(one)]
+    placed = [i for i, one in enumerate(logs) if dated(start_ns(one))]
     if not placed:
         return ()
     found, session, end = [-1] * len(logs), -1, 0.0
@@ -43,7 +35,7 @@ def sessions(logs: Sequence[AveragedLog]) -> tuple[int, ...]:
             session, end = session + 1, start_h
         end = max(end, start_h + float(logs[i].windows.measurements.t[-1]) / 3600.0)
         found[i] = session
-    for i in [i for i, one in enumerate(logs) if not dated(one)]:
+    for i in [i for i, one in enumerate(logs) if not dated(start_ns(one))]:
         session += 1
         found[i] = session
     return tuple(found)

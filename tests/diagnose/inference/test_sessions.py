@@ -13,9 +13,10 @@ import pytest
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit, estimate_campaign
 from ferryid.diagnose.inference.campaign_logs import Member
 from ferryid.diagnose.inference.campaign_model import Campaign, Spreads
-from ferryid.diagnose.inference.sessions import CLOCK_SET_NS, sessions
+from ferryid.diagnose.inference.sessions import sessions
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.campaign_evidence import Gain, held_out_loss, without_conditions
+from ferryid.signals.thresholds import SIGNALS
 from ferryid.types import Floats
 from tests.diagnose.inference.test_campaign_estimation import WINDS, campaign
 
@@ -23,7 +24,7 @@ HOUR_NS = 3_600_000_000_000
 FIRST, SECOND = (-2.0, 1.5), (2.5, -1.0)
 
 
-def log(start_h: float, minutes: float = 12.0, first_ns: int = CLOCK_SET_NS) -> Any:
+def log(start_h: float, minutes: float = 12.0, first_ns: int = SIGNALS.epoch_ns) -> Any:
     measured = SimpleNamespace(survey=SimpleNamespace(t0_ns=first_ns + round(start_h * HOUR_NS)))
     windows = SimpleNamespace(measurements=SimpleNamespace(t=np.linspace(0.0, 60.0 * minutes, 10)))
     return SimpleNamespace(screened=SimpleNamespace(measured=measured), windows=windows)
