@@ -153,7 +153,9 @@ class Learner:
             # Whatever was found beside forces that act the wrong way is an error of the profile.
             raise
         except FerryIdError as error:
-            return diagnosed, Learned(False, f"Nothing was learned beside the findings: {error}")
+            # What a fit should do instead names options that a diagnosis has not.
+            cause = str(error).partition(" Fix: ")[0]
+            return diagnosed, Learned(False, f"Nothing was learned beside the findings: {cause.removesuffix('.')}.")
         if wider is None:
             return found
         try:
