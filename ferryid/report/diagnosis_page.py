@@ -11,6 +11,7 @@ import numpy as np
 
 from ferryid.counts import counted
 from ferryid.diagnose import Diagnosis, Finding, Withheld, campaign_verdict
+from ferryid.identify.fit_warnings import log_warnings
 from ferryid.models.prediction import FreeRun
 from ferryid.report import (
     campaign,
@@ -22,7 +23,6 @@ from ferryid.report import (
     likeness,
     second_sources,
 )
-from ferryid.report.alike_notes import said_once
 from ferryid.report.campaign import TEXT_COLUMNS
 from ferryid.report.drawings import NONE, Drawings
 from ferryid.report.html import template
@@ -121,7 +121,7 @@ def _several_as_text(diagnoses: Sequence[Diagnosis]) -> str:
     if together and (instruments := second_sources.lines(together)):
         blocks.append("\n".join(_folded(line) for line in instruments))
     unused = [one for one in diagnoses if one.verdict == "not_testable"]
-    if why := said_once([(one.log, note) for one in unused for note in diagnosis_words.notes_of(one, shared)]):
+    if why := log_warnings([(one.log, diagnosis_words.notes_of(one, shared)) for one in unused]):
         blocks.append("\n".join(_folded(line) for line in why))
     tested = [one for one in diagnoses if one not in unused]
     blocks.append(_folded(campaign.left_to_the_page(tested, shared)))
