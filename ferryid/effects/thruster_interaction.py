@@ -29,9 +29,7 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
     actuators = force_model.measurements.profile.actuators
     parts = force_model.parts.copy()
     size = np.hypot(force_model.parts[:, :, 0], force_model.parts[:, :, 1])
-    pushes = [
-        np.sqrt(np.minimum(size[:, j] / _full(force_model, j, size[:, j]), 1.0)) for j in range(len(actuators))
-    ]
+    pushes = [np.sqrt(np.minimum(size[:, j] / _full(force_model, j, size[:, j]), 1.0)) for j in range(len(actuators))]
     for i, hit in enumerate(actuators):
         for j, source in enumerate(actuators):
             dx, dy = hit.position_m[0] - source.position_m[0], hit.position_m[1] - source.position_m[1]
