@@ -18,6 +18,7 @@ ROOT = Path(__file__).resolve().parents[1]
 ORDER = (
     "errors",
     "counts",
+    "log_warnings",
     "files",
     "interrupts",
     "cached",

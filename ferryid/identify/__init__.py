@@ -2,7 +2,6 @@
 
 from ferryid.identify.acceptance import Acceptance, accept, accept_on_motions, force_mse
 from ferryid.identify.archive import fit_archive, keep_for_archive
-from ferryid.identify.fit_warnings import log_warnings
 from ferryid.identify.inputs import read_logs
 from ferryid.identify.model_selection import Selection
 from ferryid.identify.outcome import ComponentCurve, Excitation, FitOutcome, LogFit
@@ -30,7 +29,6 @@ __all__ = [
     "force_mse",
     "inertia_checks",
     "keep_for_archive",
-    "log_warnings",
     "parse_window",
     "parse_windows",
     "prediction_errors",

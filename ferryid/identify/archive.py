@@ -20,7 +20,7 @@ from ferryid.identify.block_sum_store import StoredSums, load_block_sums
 from ferryid.identify.estimation import estimate_correction
 from ferryid.identify.excitation import SECTORS, sector_coverage
 from ferryid.identify.fit_data import Coefficients, Estimate, FitData
-from ferryid.identify.fit_warnings import general_warnings, log_warnings
+from ferryid.identify.fit_warnings import general_warnings
 from ferryid.identify.inertia import axes_without_force
 from ferryid.identify.log_sums import pooled_deviation, pooled_mean_square
 from ferryid.identify.model_selection import select_model
@@ -31,6 +31,7 @@ from ferryid.identify.split import validation_blocks
 from ferryid.identify.weak_archive import fit_weak_archive
 from ferryid.identify.window_store import load_windows
 from ferryid.identify.windowed_data import NOT_RUN
+from ferryid.log_warnings import log_warnings
 from ferryid.models import ForceScores, ModelScores, span_ranges
 from ferryid.models.prediction import FreeRun
 from ferryid.models.store import check_name

@@ -12,7 +12,7 @@ from ferryid.cached import cached_property
 from ferryid.counts import counted
 from ferryid.identify.excitation import sector_coverage
 from ferryid.identify.fit_data import Coefficients, Estimate
-from ferryid.identify.fit_warnings import general_warnings, log_warnings
+from ferryid.identify.fit_warnings import general_warnings
 from ferryid.identify.inertia import axes_without_force
 from ferryid.identify.log_sums import pooled_deviation
 from ferryid.identify.log_windows import LogWindows, WindowPart
@@ -23,6 +23,7 @@ from ferryid.identify.split import Split
 from ferryid.identify.weak_data import WeakData
 from ferryid.identify.weak_rows import WeakRows
 from ferryid.identify.window_loads import LoadSamples
+from ferryid.log_warnings import log_warnings
 from ferryid.models import ModelScores, span_ranges
 from ferryid.models.prediction import FreeRun
 from ferryid.regression import CrossProducts, singular_values, undetermined_terms

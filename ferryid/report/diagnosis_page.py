@@ -11,7 +11,7 @@ import numpy as np
 
 from ferryid.counts import counted
 from ferryid.diagnose import Diagnosis, Finding, Withheld, campaign_verdict
-from ferryid.identify import log_warnings
+from ferryid.log_warnings import log_warnings
 from ferryid.models.prediction import FreeRun
 from ferryid.report import (
     campaign,

@@ -68,10 +68,12 @@ def _of_sensor(finding: Finding) -> bool:
 
 def _faults(findings: Sequence[Finding], names: Sequence[str]) -> list[str]:
     """Return which faults the sensors have, those that are corrected here apart from those that are not, as a clause."""
-    corrected = [name for one, name in zip(findings, names, strict=True) if NOT_CORRECTED not in one.says]
     left = [name for one, name in zip(findings, names, strict=True) if NOT_CORRECTED in one.says]
-    parts = [f"corrected here: {listed(list(dict.fromkeys(corrected)))}"] if corrected else []
-    parts += [f"not corrected here: {listed(list(dict.fromkeys(left)))}"] if left else []
+    corrected = [name for one, name in zip(findings, names, strict=True) if NOT_CORRECTED not in one.says]
+    told = [f"{name} (not in every log)" if name in left else name for name in dict.fromkeys(corrected)]
+    rest = [name for name in dict.fromkeys(left) if name not in corrected]
+    parts = [f"corrected here: {listed(told)}"] if told else []
+    parts += [f"not corrected here: {listed(rest)}"] if rest else []
     return [f"sensors have faults, {', and '.join(parts)}"] if parts else []
 
 

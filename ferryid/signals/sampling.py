@@ -88,7 +88,7 @@ def single_rows(recording: Recording) -> str:
 
 def _remedy(recording: Recording, lead: Stream, period_s: float) -> str:
     is_table = any(topic.encoding == "table" and topic.name == lead.topic for topic in recording.topics)
-    if lead.clock.resets:
+    if is_table and lead.clock.resets > SIGNALS.unsorted_share * lead.clock.count:
         return f"sort the rows by time, which goes back {counted(lead.clock.resets, 'time')}"
     if is_table:
         for unit, name, scale in _UNITS:

@@ -98,6 +98,12 @@ class SignalThresholds:
         "rows further apart are in another unit of time, not recorded so slowly",
         "convention: no motion of a vessel is recorded at such a period",
     )
+    unsorted_share: float = threshold(
+        0.1,
+        "of the rows",
+        "rows at which time goes back above which a table is not sorted by time, rather than that its clock was set",
+        "convention: nobody sets a clock at every tenth row; half of the rows of a shuffled table go back",
+    )
     lowest_usual_hz: float = threshold(
         0.5, "Hz", "lowest rate that another unit of time must give", "convention: rates at which logs are recorded"
     )

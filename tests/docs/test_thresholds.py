@@ -180,8 +180,8 @@ NO_DECISION = {
         identify.archive MOST_DRAWN
         identify.block_sum_store _VELOCITIES
         identify.excitation SECTORS
-        identify.fit_warnings ALIKE_LOGS
-        identify.fit_warnings MOST_LOGS_SAID
+        log_warnings ALIKE_LOGS
+        log_warnings MOST_LOGS_SAID
         identify.sign_changes MOST_NAMED
         identify.gusts _PROBES MANY_WINDOWS
         identify.weak_archive _AT_A_TIME

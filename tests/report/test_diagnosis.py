@@ -269,6 +269,8 @@ def test_the_verdict_does_not_call_a_fault_corrected_that_is_left_as_it_is() -> 
         one = replace(diagnosis("explained"), findings=findings)
         assert f"the {told}" in headline(one)
         assert f"The {told}." in summary([one, replace(one, log="other")])
+    some = [replace(diagnosis("explained"), findings=(one,)) for one in (offset, left)]
+    assert "The sensors have faults, corrected here: clock offset (not in every log)." in summary(some)
 
 
 def test_a_free_run_that_turned_too_often_is_told_in_turns() -> None:

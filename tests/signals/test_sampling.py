@@ -125,6 +125,10 @@ def test_rows_out_of_order_are_not_taken_for_another_unit(tmp_path: Path, boat: 
     path = table(tmp_path, [f"{t:.2f}" for t in times])
     with pytest.raises(FerryIdError, match=r"Fix: sort the rows by time, which goes back \d+ times$"):
         prepare(path, boat, None, window_s=1.0)
+    # A clock that was set back once leaves the unit in doubt.
+    path = table(tmp_path, [str(100 * (n if n < 200 else n - 50)) for n in range(300)])
+    with pytest.raises(FerryIdError, match="look like milliseconds"):
+        prepare(path, boat, None, window_s=1.0)
 
 
 def test_a_log_of_one_sample_per_second_is_taken(tmp_path: Path, boat: Profile) -> None:

@@ -11,7 +11,6 @@ from ferryid.counts import counted
 from ferryid.effects.wording import listed
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.identify.archive import archive_folds
-from ferryid.identify.fit_warnings import log_warnings
 from ferryid.identify.inputs import read_logs
 from ferryid.identify.log_sums import folds_by_blocks, folds_by_logs, force_free_axes, sum_log
 from ferryid.identify.model_selection import Selection, select_model, windows_to_try
@@ -22,6 +21,7 @@ from ferryid.identify.settings import FOLDS, TEST_WINDOW_S, WINDOWS_S, FitSettin
 from ferryid.identify.split import TooShort
 from ferryid.identify.sweeps.swept import Swept, beats_base
 from ferryid.identify.sweeps.weak_sweep import sweep_weak
+from ferryid.log_warnings import log_warnings
 from ferryid.regression.bases import Basis
 from ferryid.regression.cross_validation import Folds
 from ferryid.signals.prepare import Opened

@@ -15,7 +15,6 @@ import numpy as np
 
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError
-from ferryid.identify.fit_warnings import log_warnings
 from ferryid.identify.inertia import without_inertia
 from ferryid.identify.inputs import read_logs
 from ferryid.identify.log_sums import LogSums, force_free_axes, sum_motions
@@ -27,6 +26,7 @@ from ferryid.identify.sweeps.settings_sweep import as_a_fit, check_folds, deriva
 from ferryid.identify.sweeps.structure_comparison import StructureComparison, StructureSweep
 from ferryid.identify.sweeps.structure_ranking import StructureErrors, rank_structures
 from ferryid.identify.sweeps.weak_structures import compare_weak
+from ferryid.log_warnings import log_warnings
 from ferryid.models.forces import compute_residual
 from ferryid.regression import REGRESSION, CrossProducts, fit_simpls, total
 from ferryid.regression.bases import STRUCTURES, Basis, basis_names, with_hull_length

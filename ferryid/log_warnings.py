@@ -1,0 +1,51 @@
+"""What is said of single logs of several: once, with ranges, where it differs by its numbers alone."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from ferryid.counts import counted, verb
+
+MOST_LOGS_SAID = 10
+"""Logs of an archive whose own warnings are repeated for all of it."""
+ALIKE_LOGS = 3
+"""Logs of which the same is said with other numbers, from which on it is said once."""
+NUMBER = re.compile(r"(?<![\w.:,-])\d+(?:,\d{3})*(?:\.\d+)?(?![\w.:-]*\w)")
+PLACE = "\0"
+"""A number without a sign that is no part of a name or of a time, and what stands in its place in the shape of a sentence."""
+
+
+def log_warnings(told: Sequence[tuple[str, Sequence[str]]]) -> tuple[str, ...]:
+    """Return what is told of single logs, each with its name, of the first `MOST_LOGS_SAID` that have anything to tell.
+
+    What differs by its numbers alone in `ALIKE_LOGS` logs or more is one sentence with their ranges.
+
+    Parameters
+    ----------
+    told
+        Name of every log, and sentences.
+    """
+    by_shape: dict[str, dict[str, str]] = {}
+    for name, sentences in told:
+        for sentence in sentences:
+            by_shape.setdefault(NUMBER.sub(PLACE, sentence), {})[name] = sentence
+    alike = {shape: of_logs for shape, of_logs in by_shape.items() if len(of_logs) >= ALIKE_LOGS}
+    said = [
+        f"{counted(len(of_logs), 'log')}: {_ranged(shape, list(of_logs.values()))}" for shape, of_logs in alike.items()
+    ]
+    rest = [(name, [one for one in sentences if NUMBER.sub(PLACE, one) not in alike]) for name, sentences in told]
+    those = [(name, sentences) for name, sentences in rest if sentences]
+    said += [f"{name}: {sentence}" for name, sentences in those[:MOST_LOGS_SAID] for sentence in sentences]
+    if (others := len(those) - MOST_LOGS_SAID) > 0:
+        said.append(f"{counted(others, 'more log')} {verb(others, 'has')} such warnings, see the JSON.")
+    return tuple(said)
+
+
+def _ranged(shape: str, sentences: Sequence[str]) -> str:
+    """Return sentences of one shape as one, with the least and the most of each number that differs."""
+    text = shape
+    for values in zip(*(NUMBER.findall(one) for one in sentences), strict=True):
+        least, most = (end(values, key=lambda value: float(value.replace(",", ""))) for end in (min, max))
+        text = text.replace(PLACE, least if least == most else f"{least} to {most}", 1)
+    return text

@@ -1,0 +1,26 @@
+"""What is said of single logs of several: one line where it differs by its numbers alone."""
+
+from __future__ import annotations
+
+from ferryid.log_warnings import log_warnings
+
+
+def used(seconds: str, first: str, topic: str = "/left_thruster2") -> str:
+    return f"{seconds} s are used, without the first {first} s, as {topic} begins then."
+
+
+def test_what_several_logs_have_alike_is_one_warning_with_ranges() -> None:
+    told = [("a", [used("83.0", "5.9")]), ("b", [used("1,030.0", "10.8"), "It is still."]), ("c", [used("9.5", "5.9")])]
+    assert log_warnings(told) == (
+        "3 logs: 9.5 to 1,030.0 s are used, without the first 5.9 to 10.8 s, as /left_thruster2 begins then.",
+        "b: It is still.",
+    )
+
+
+def test_what_two_logs_have_or_what_differs_by_a_name_or_a_time_stays_of_each() -> None:
+    two = [("a", [used("83.0", "5.9")]), ("b", [used("9.5", "3.7")])]
+    assert log_warnings(two) == tuple(f"{name}: {one}" for name, (one,) in two)
+    named = [(name, [used("83.0", "5.9", f"/thruster{name}")]) for name in "123"]
+    assert log_warnings(named) == tuple(f"{name}: {one}" for name, (one,) in named)
+    timed = [(name, [f"It begins at 10:4{name}:10."]) for name in "123"]
+    assert log_warnings(timed) == tuple(f"{name}: {one}" for name, (one,) in timed)
