@@ -180,8 +180,6 @@ NO_DECISION = {
         identify.archive MOST_DRAWN
         identify.block_sum_store _VELOCITIES
         identify.excitation SECTORS
-        log_warnings ALIKE_LOGS
-        log_warnings MOST_LOGS_SAID
         identify.sign_changes MOST_NAMED
         identify.gusts _PROBES MANY_WINDOWS
         identify.weak_archive _AT_A_TIME

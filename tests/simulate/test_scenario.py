@@ -244,7 +244,7 @@ def test_a_fault_is_said_in_one_line_with_its_place(old: str, new: str, line: in
     [
         ('kind = "rpm-steps"', 'kind = "zig-zag"', 5, 'Did you mean "zigzag"?'),
         ('kind = "rpm-steps"\n', "", 4, '[manoeuvre] lacks "kind"'),
-        ("levels = [0.5, -0.5]", "levels = []", 6, '"levels" is empty'),
+        ("levels = [0.5, -0.5]", "levels = []", 6, '"levels" is an empty array'),
         ("levels = [0.5, -0.5]", "levels = [1.5]", 6, "shares of speed_rpm"),
         ("levels = [0.5, -0.5]", f"levels = {[0.1] * 101}", 6, "at most 100"),
         ("duration_s = 100", "duration_s = 1e6", 4, "Fix: set duration_s"),
