@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass
+from functools import partial
 
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, fit, without
 from ferryid.diagnose.inference.onset_estimation import is_brief
@@ -12,7 +13,7 @@ from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.axis_consistency import check_axis_consistency
 from ferryid.diagnose.judging.credibility import interval_doubt
 from ferryid.diagnose.judging.held_out import HeldOutEvidence, held_out_evidence
-from ferryid.diagnose.judging.rivals import RivalComparison, compare_rivals
+from ferryid.diagnose.judging.rivals import RivalComparison, compare_rivals, redundant_shape
 from ferryid.diagnose.judging.size_estimates import size_estimates
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.judging.unexplained import find_displaced
@@ -23,6 +24,7 @@ PLACEBO = (
 )
 INCONSISTENT = "on an axis where it would have to act, most of it is missing"
 BRIEF = "it acts for less time than held-out data can judge, and its 95 % interval includes no effect at all"
+SAME_CURVE = "another shape of the same thrust curve, as idealised, explains nearly as much as both together"
 LAW = "an empirical law of the motion explains more in that place, and leaves nothing to explain"
 
 
@@ -126,9 +128,19 @@ def _fallen(problem: EstimationProblem, kept: Fit, proof: HeldOutEvidence | None
     inconsistent = [i for i in range(len(kept.candidates)) if check_axis_consistency(problem, kept, i).inconsistent]
     if inconsistent:
         return inconsistent[0], INCONSISTENT
+    shapes = redundant_shape(kept.candidates, partial(_evidence_without, problem, kept))
+    if shapes is not None:
+        return shapes[0], SAME_CURVE
     # Physics without a name here may look a little like an effect.
     imitated = find_displaced(problem, kept)
     return (imitated[0], LAW) if imitated else (None, "")
+
+
+def _evidence_without(problem: EstimationProblem, kept: Fit, left_out: Set[int]) -> float:
+    """Return the evidence of a fit without the candidates at some places."""
+    for place in sorted(left_out, reverse=True):
+        kept = without(problem, kept, place)
+    return kept.evidence
 
 
 def _is_brief_and_unsized(problem: EstimationProblem, kept: Fit, i: int) -> bool:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass
+from functools import partial
 from math import exp, inf
 
 import numpy as np
@@ -12,7 +13,7 @@ from ferryid.counts import counted
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit
 from ferryid.diagnose.inference.campaign_model import Campaign
-from ferryid.diagnose.inference.campaign_properties import TriedProperty, select_properties, without_property
+from ferryid.diagnose.inference.campaign_properties import Rivals, TriedProperty, select_properties, without_property
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.feedback import OUT_OF_STEP, Feedback, feedback_beside, joined
 from ferryid.diagnose.inference.force_errors import mass_of
@@ -23,7 +24,7 @@ from ferryid.diagnose.judging.campaign_evidence import Gain, held_out_loss
 from ferryid.diagnose.judging.credibility import felt, interval_doubt, unfelt, value_doubt
 from ferryid.diagnose.judging.experiment_design import manoeuvre
 from ferryid.diagnose.judging.finding import Finding, Rival
-from ferryid.diagnose.judging.rivals import same_curve
+from ferryid.diagnose.judging.rivals import redundant_shape, same_curve
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.effect import HELD
 from ferryid.effects.wording import weak_evidence
@@ -170,8 +171,26 @@ class PropertyTest:
 
 def judge_properties(made: CampaignFit, progress: Callable[[str], None]) -> tuple[PropertyTest, ...]:
     """Select lasting properties beside the hull and the conditions of an estimate, and judge each on held-out data."""
-    found, rivals = select_properties(made, progress)
+    found, rivals = _one_shape_of_each_curve(*select_properties(made, progress))
     return tuple(tested(found, one, rivals.get(one.key, ())) for one in found.campaign.properties)
+
+
+def _one_shape_of_each_curve(made: CampaignFit, rivals: Rivals) -> tuple[CampaignFit, Rivals]:
+    """Return an estimate without the weaker of two shapes of a thrust curve that explain the same: it is the other's rival."""
+    while shapes := redundant_shape(made.campaign.properties, partial(_evidence_without, made)):
+        weaker, stronger = (made.campaign.properties[place] for place in shapes[:2])
+        odds = _evidence_without(made, {shapes[1]}) - _evidence_without(made, {shapes[0]})
+        others = [one for one in rivals.get(stronger.key, ()) if one.candidate.key != weaker.key]
+        rivals = {**rivals, stronger.key: (*others, TriedProperty(weaker, odds, shapes[2]))}
+        made = without_property(made, weaker)
+    return made, rivals
+
+
+def _evidence_without(made: CampaignFit, left_out: Set[int]) -> float:
+    """Return the evidence of an estimate without the properties at some places."""
+    for candidate in [made.campaign.properties[place] for place in left_out]:
+        made = without_property(made, candidate)
+    return made.evidence
 
 
 def tested(made: CampaignFit, candidate: Candidate, rivals: Sequence[TriedProperty]) -> PropertyTest:

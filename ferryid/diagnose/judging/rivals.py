@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass, replace
+from itertools import combinations
 from math import exp, inf
 
 from ferryid.diagnose.inference.common_cause import with_fewer_coefficients
@@ -90,6 +91,38 @@ def same_curve(one: Candidate, other: Candidate, share: float) -> bool:
     """
     shapes = one.effect.of_thrust_curve and other.effect.of_thrust_curve
     return shapes and one.instance == other.instance and share >= JUDGING.alike_shapes
+
+
+def redundant_shape(
+    candidates: Sequence[Candidate], evidence: Callable[[Set[int]], float]
+) -> tuple[int, int, float] | None:
+    """Return the weaker and the stronger of two shapes of one thrust curve where either explains nearly what both do.
+
+    The formulas of both are idealised, so that the second is what the first's is off by.
+
+    Parameters
+    ----------
+    candidates
+        What was selected.
+    evidence
+        Returns the logarithm of the evidence without some of them, which are given by their places [nat].
+
+    Returns
+    -------
+    tuple of int, int, float or None
+        Places of the weaker and of the stronger, and the evidence of the first over that of the other, each alone over none;
+        None where there are no such two.
+    """
+    for i, j in combinations(range(len(candidates)), 2):
+        if not same_curve(candidates[i], candidates[j], 1.0):
+            continue
+        none = evidence({i, j})
+        alone = {i: evidence({j}) - none, j: evidence({i}) - none}
+        weaker, stronger = sorted(alone, key=lambda k: alone[k])
+        both = evidence(frozenset()) - none
+        if both > 0.0 and same_curve(candidates[weaker], candidates[stronger], alone[weaker] / both):
+            return weaker, stronger, alone[weaker] / alone[stronger]
+    return None
 
 
 def compare_rivals(problem: EstimationProblem, kept: Fit, index: int, library: Sequence[Candidate]) -> RivalComparison:

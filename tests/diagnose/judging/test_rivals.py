@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Set
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from ferryid.diagnose.inference.estimation import Candidate, Fit
-from ferryid.diagnose.judging.rivals import RivalComparison, RivalFit, same_curve
+from ferryid.diagnose.judging import campaign_properties
+from ferryid.diagnose.judging.campaign_properties import _one_shape_of_each_curve
+from ferryid.diagnose.judging.rivals import RivalComparison, RivalFit, redundant_shape, same_curve
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
 
@@ -52,3 +57,60 @@ def test_other_effects_and_other_actuators_have_no_curve_in_common(fitted: Fit) 
 def test_a_finding_without_evidence_has_no_shape_beside_it(fitted: Fit) -> None:
     assert compared(fitted, {AIR: -10.0}, 0.0).unresolved(candidate(LIMIT)) == ()
     assert replace(compared(fitted, {}, 300.0), rivals=()).unresolved(candidate(LIMIT)) == ()
+
+
+def weighed(alone: dict[int, float], both: float) -> Callable[[Set[int]], float]:
+    """Return the evidence of two effects without some of them: of either alone, and of both, over none."""
+    return lambda left_out: (
+        -1000.0 + (both if not left_out else 0.0 if len(left_out) == 2 else alone[1 - next(iter(left_out))])
+    )
+
+
+SHAPES = [candidate(AIR), candidate(LIMIT)]
+
+
+@pytest.mark.parametrize(
+    ("selected", "alone", "both", "redundant"),
+    [
+        # Figures of a campaign at sea whose propeller drew air: either explains nine tenths of what both do.
+        (SHAPES, {0: 1136.2, 1: 1112.5}, 1208.3, (1, 0)),
+        (SHAPES, {0: 1112.5, 1: 1136.2}, 1208.3, (0, 1)),
+        # One explains what the other cannot, however little that is: a band about zero beside a limit.
+        (SHAPES, {0: 1136.2, 1: 72.1}, 1208.3, None),
+        (SHAPES, {0: 604.0, 1: 604.0}, 1208.0, None),
+        # Of two actuators, and an effect that is no shape of a curve.
+        ([candidate(AIR, "fore"), candidate(LIMIT, "aft")], {0: 1136.2, 1: 1112.5}, 1208.3, None),
+        ([candidate("thruster_gain"), candidate(LIMIT)], {0: 1136.2, 1: 1112.5}, 1208.3, None),
+        # Nothing that either explains.
+        (SHAPES, {0: -3.0, 1: -3.0}, -5.0, None),
+    ],
+)
+def test_of_two_shapes_of_a_curve_that_explain_the_same_the_weaker_is_redundant(
+    selected: list[Candidate], alone: dict[int, float], both: float, redundant: tuple[int, int] | None
+) -> None:
+    found = redundant_shape(selected, weighed(alone, both))
+    assert (None if found is None else found[:2]) == redundant
+    if found is not None:
+        assert found[2] == pytest.approx(1112.5 / 1136.2)
+
+
+def test_a_campaign_keeps_one_shape_of_a_curve_with_the_other_as_its_rival(monkeypatch: pytest.MonkeyPatch) -> None:
+    evidence = {(AIR, LIMIT): 208.3, (AIR,): 136.2, (LIMIT,): 112.5, (): -1000.0}
+
+    def estimate(*properties: Candidate) -> Any:
+        return SimpleNamespace(
+            campaign=SimpleNamespace(properties=properties),
+            evidence=evidence[tuple(one.effect.id for one in properties)],
+        )
+
+    monkeypatch.setattr(
+        campaign_properties,
+        "without_property",
+        lambda made, one: estimate(*(other for other in made.campaign.properties if other is not one)),
+    )
+    made, rivals = _one_shape_of_each_curve(estimate(*SHAPES), {})
+    assert [one.effect.id for one in made.campaign.properties] == [AIR]
+    (rival,) = rivals[SHAPES[0].key]
+    assert rival.candidate.effect.id == LIMIT
+    assert rival.odds == pytest.approx(112.5 - 136.2)
+    assert rival.share >= JUDGING.alike_shapes
