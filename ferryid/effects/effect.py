@@ -142,6 +142,12 @@ class Effect:
     longest_s
         Longest time for which it acts [s], at most `EFFECTS.longest_share` of a log, as one that never lasts throughout: see
         `passing`. Infinite for one that may.
+    otherwise
+        ``otherwise(force_model, p, instance)`` returns the force model as it is before it begins and after it ends; None where
+        nothing acts then.
+    step
+        The same effect as a step from a level that is not known, its second parameter: of a vessel without a hull model, on
+        which masses and damping that are off look like another level. None where there is no such form.
     impulse
         ``impulse(force_model, p)`` returns the momentum that an effect gives the vessel if it begins in a row
         [N·s, N·s, N·m·s], shape (n, 3). What ends leaves the velocity as it is.
@@ -232,6 +238,8 @@ class Effect:
     cannot_be_of: Callable[[Measurements, str | None], str] = lambda measurements, instance: ""
     onset: bool = False
     longest_s: float = inf
+    otherwise: Callable[[ForceModel, Floats, str | None], ForceModel] | None = None
+    step: Effect | None = None
     impulse: Callable[[ForceModel, Floats], Floats] | None = None
     vessel: bool = False
     choose: Callable[[ForceModel, Floats, Residual], Choice] | None = None
@@ -309,4 +317,5 @@ class Effect:
         if onset_s <= 0.0 and not isfinite(offset_s):
             return after
         impulse = None if self.impulse is None or onset_s <= 0.0 else self.impulse(force_model, p)
-        return between(force_model, after, onset_s, offset_s, impulse)
+        before = force_model if self.otherwise is None else self.otherwise(force_model, p, instance)
+        return between(before, after, onset_s, offset_s, impulse)

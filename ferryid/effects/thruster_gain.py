@@ -1,5 +1,8 @@
 """Thruster gain: one thruster gives more or less force than its curve says, from the start or from a time on.
 
+Of a vessel without a hull model nobody knows how strong a thruster is at any time: a factor on its masses and damping does the
+same. What is known is that its force changed, and by how much: there a step has a level on either side.
+
 A rudder behind a propeller feels the thrust that acts: its force changes by what the slipstream does, and not by the factor.
 """
 
@@ -20,6 +23,22 @@ from ferryid.vessel.thrusters import force_at, rudder_behind
 def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     """Return the factor on the force."""
     return (Parameter("factor", "-", 0.2, 0.0, 3.0, neutral=1.0, attainable=frozenset({0.0})),)
+
+
+def parameters_of_step(profile: Profile) -> tuple[Parameter, ...]:
+    """Return the factor in the span of a step on the force at other times, and that on the thrust curve then."""
+    (factor,) = parameters_of(profile)
+    return factor, replace(factor, name="otherwise")
+
+
+def apply_step(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+    """Multiply the thrust of the thruster by both."""
+    return apply(force_model, p[:1] * p[1:], instance)
+
+
+def otherwise(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+    """Multiply the thrust of the thruster as at other times."""
+    return apply(force_model, p[1:], instance)
 
 
 def instances(profile: Profile) -> tuple[str | None, ...]:
@@ -47,7 +66,8 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
 
 def says(values: Values, instance: str | None) -> str:
     """Return the finding as a sentence."""
-    return f"{instance} gives {100.0 * values['factor']:.0f} % of the force of its thrust curve."
+    compared = "of its thrust curve" if "otherwise" not in values else "that it gives at other times"
+    return f"{instance} gives {100.0 * values['factor']:.0f} % of the force {compared}."
 
 
 def scenario(values: Values, instance: str | None) -> dict[str, Any]:
@@ -63,7 +83,7 @@ def regressor(force_model: ForceModel, p: Floats, instance: str | None, axis: st
     return f"{instance}'s own {axis} {'moment [N·m]' if axis == 'yaw' else 'force [N]'}", force_model.parts[:, k, j]
 
 
-EFFECT = Effect(
+GAIN = Effect(
     "thruster_gain",
     "Thruster force",
     parameters_of,
@@ -79,3 +99,4 @@ EFFECT = Effect(
     passing_size=EFFECTS.passing_gain,
     by_row=True,
 )
+EFFECT = replace(GAIN, step=replace(GAIN, parameters_of=parameters_of_step, apply=apply_step, otherwise=otherwise))

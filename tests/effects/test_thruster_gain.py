@@ -25,7 +25,7 @@ def measured(profile: Profile, columns: dict[str, Floats], current: Floats | Non
     parts, angles = actuator_forces(profile, columns, through_water, every)
     return Measurements(
         profile=profile,
-        t=0.2 * np.arange(N),
+        t=np.asarray(0.2 * np.arange(N), dtype=np.float64),
         eta=np.zeros((N, 3)),
         nu_raw=nu,
         nu=nu,
@@ -70,3 +70,21 @@ def test_without_a_rudder_the_force_is_multiplied() -> None:
     # Measurements that lack the states of their rudders, as those of rows that nobody recorded, have the share alone.
     bare = replace(measured(TANKER, {"F_propeller": np.full(N, 9.0), "delta_propeller": np.full(N, 0.1)}), rudders=None)
     np.testing.assert_allclose(weak(bare, 0.7, "propeller"), 0.7 * bare.parts)
+
+
+def test_a_step_goes_from_a_level_that_is_not_the_thrust_curves() -> None:
+    """Half of 160 % of the curve between 2 and 4 s."""
+    columns = {f"n_thruster{k}": np.full(N, 300.0) for k in range(1, 3)}
+    columns |= {f"alpha_thruster{k}": np.zeros(N) for k in range(1, 3)}
+    measurements = measured(FERRY, columns)
+    plain = ForceModel(measurements, hull_of(FERRY), measurements.parts, measurements.angles, np.zeros((N, 3)))
+    step = effects()["thruster_gain"].step
+    assert step is not None
+    p = np.array([0.5, 1.6])
+    found = step.act(plain, p, "thruster2", 2.0, 4.0).parts[:, 1, 0] / plain.parts[:, 1, 0]
+    inside = (measurements.t >= 2.0) & (measurements.t < 4.0)
+    np.testing.assert_allclose(found, np.where(inside, 0.8, 1.6))
+    # Nothing else has changed, and a step that is none is a level.
+    np.testing.assert_array_equal(step.act(plain, p, "thruster2", 2.0).parts[:, 0], plain.parts[:, 0])
+    level = effects()["thruster_gain"].apply(plain, p[1:], "thruster2")
+    np.testing.assert_allclose(step.act(plain, np.array([1.0, 1.6]), "thruster2", 2.0).parts, level.parts)

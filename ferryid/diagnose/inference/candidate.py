@@ -84,6 +84,16 @@ class Candidate:
         return self.effect.id, self.instance
 
     @property
+    def is_step(self) -> bool:
+        """True for a step between two levels, of which the second stays where it is taken away."""
+        return self.effect.otherwise is not None
+
+    def as_step(self, profile: Profile) -> Candidate:
+        """Return it as a step between two levels in its span, where its effect has that form."""
+        step = self.effect.step
+        return self if step is None else replace(self, effect=step, parameters=step.parameters_of(profile))
+
+    @property
     def title(self) -> str:
         """The effect's title, with the thruster that it is one of."""
         return titled(self.effect.title, self.instance)

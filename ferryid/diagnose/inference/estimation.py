@@ -18,6 +18,7 @@ from ferryid.diagnose.inference.noise_estimation import excerpt, fit_noise
 from ferryid.diagnose.inference.noise_model import NoiseModel, WhiteningFilter, make_whitening_filter
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
+from ferryid.effects import effects
 from ferryid.effects.effect import HELD
 from ferryid.effects.force_model import ForceModel
 from ferryid.types import Floats, Ints
@@ -352,14 +353,27 @@ def effect_slopes(problem: EstimationProblem, kept: Fit) -> Floats:
     return np.stack(columns, axis=1) if columns else np.empty((len(left), 0))
 
 
+def rest_of(made: Fit, index: int) -> tuple[list[Candidate], list[Floats]]:
+    """Return the candidates of a fit beside one of them, and their values; of a step, its level at other times is one."""
+    candidates, values = list(made.candidates), list(made.values)
+    one, value = candidates[index], values[index]
+    if not one.is_step:
+        del candidates[index], values[index]
+        return candidates, values
+    candidates[index] = replace(
+        one, effect=effects()[one.effect.id], parameters=one.parameters[:1], onset_s=0.0, offset_s=inf
+    )
+    values[index] = value[1:]
+    return candidates, values
+
+
 def without(problem: EstimationProblem, made: Fit, index: int) -> Fit:
-    """Return the fit of a hypothesis that lacks one of its candidates.
+    """Return the fit of a hypothesis that lacks one of its candidates; in the place of a step it has one level all along.
 
     Of one that trades with the hull, such as a load, the posterior is a bent ridge: there the way from the profile's hull may
     end on a lower top than that from the hull beside which it was found.
     """
-    rest = [k for k in range(len(made.candidates)) if k != index]
-    candidates, values = [made.candidates[k] for k in rest], [made.values[k] for k in rest]
+    candidates, values = rest_of(made, index)
     bare = fit(problem, candidates, values)
     if not any(one.effect.profiled for one in candidates):
         return bare

@@ -385,8 +385,25 @@ def refit_spans(problem: EstimationProblem, made: Fit) -> Fit:
         best = max(tried, key=lambda one: one.evidence)
         step = max(FIRST_TIME_STEP_S, 0.5 * part_s(problem, candidate))
         sharp = refine_span(problem, best, i, begin, step)
-        made = fit(problem, sharp.candidates, sharp.values, begin=begin)
+        made = turned(problem, fit(problem, sharp.candidates, sharp.values, begin=begin), i)
     return made
+
+
+def turned(problem: EstimationProblem, made: Fit, index: int) -> Fit:
+    """Return a fit in which a step begins in the log, where it would end in it: its two levels change places."""
+    step = made.candidates[index]
+    if not step.is_step or step.times != ("offset_s",):
+        return made
+    factor, otherwise = made.values[index]
+    begins = replace(step, onset_s=step.offset_s, offset_s=inf)
+    # A factor of zero has no inverse, and an inverse may lie beyond what is searched.
+    values = np.array([min(1.0 / max(factor, 1e-6), step.parameters[0].high), factor * otherwise])
+    return fit(
+        problem,
+        replace_candidate(made.candidates, index, begins),
+        [values if k == index else one for k, one in enumerate(made.values)],
+        begin=starting_point(problem, made),
+    )
 
 
 def _spans_to_others(problem: EstimationProblem, candidates: Sequence[Candidate], index: int) -> list[Candidate]:

@@ -34,6 +34,7 @@ from ferryid.diagnose.inference.onset_estimation import (
     refine_span,
     refit_spans,
     stands_out,
+    turned,
 )
 from ferryid.diagnose.inference.stochastic_disturbance import DisturbanceState, fit_disturbances
 from ferryid.diagnose.inference.thresholds import INFERENCE
@@ -289,6 +290,8 @@ def _best_fit(
     throughout = [] if candidate.effect.passing else [scored_fit(candidate)]
     if not candidate.effect.onset:
         return throughout[0]
+    if candidate.effect.step is not None and not problem.plain.measurements.profile.hull.is_known:
+        return max([*throughout, *_steps(problem, current, throughout[0])], key=lambda one: one.gain)
     # The impulse of an onset shows within seconds of it only; what is changed from then on leads there.
     smooth = replace(candidate, effect=replace(candidate.effect, impulse=None))
     # Seconds matter: which of them is best shows when each has its own.
@@ -315,6 +318,27 @@ def _best_fit(
         found = [settled(one) for one in found]
         return max(found, key=lambda one: one.gain)
     return max([*throughout, *found], key=lambda one: one.gain, default=None)
+
+
+def _steps(problem: EstimationProblem, current: Fit, throughout: ScoredCandidate) -> list[ScoredCandidate]:
+    """Return the likeliest step of what acts throughout in another fit, beside the current one; none where none is promising.
+
+    Which of its two levels is the thrust curve's nobody knows, so that either is estimated.
+    """
+    level = fit(problem, throughout.fit.candidates, throughout.fit.values)
+    begin, values = starting_point(problem, level), (*level.values[:-1], np.append(1.0, level.values[-1]))
+    index, profile = len(current.candidates), problem.plain.measurements.profile
+    steps = [
+        one.as_step(profile) for one in promising_spans(problem, linearise(problem, level, begin), throughout.candidate)
+    ]
+    found = [fit(problem, (*current.candidates, one), values, steps=COMPARING_ITERATIONS, begin=begin) for one in steps]
+    if not found:
+        return []
+    best, width = max(found, key=lambda made: made.evidence), 0.5 * part_s(problem, throughout.candidate)
+    for step_s in (width, min(width, FIRST_TIME_STEP_S)):
+        best = refine_span(problem, best, index, begin, step_s)
+    made = turned(problem, fit(problem, best.candidates, best.values, begin=starting_point(problem, best)), index)
+    return [ScoredCandidate(made.candidates[-1], made, made.evidence - current.evidence)]
 
 
 def _common_cause(problem: EstimationProblem, good: Sequence[ScoredCandidate]) -> ScoredCandidate:

@@ -97,7 +97,13 @@ def eliminate_backward(
 def _with_both(problem: EstimationProblem, kept: Fit, replaced: int, rival: Fit) -> Fit:
     """Return a fit with a rival, and beside it what it replaces where that is more likely than not: both may act."""
     candidate, values = kept.candidates[replaced], kept.values[replaced]
-    both = fit(problem, [*rival.candidates, candidate], [*rival.values, values])
+    # The rival of a step stands beside its level all along.
+    others = [k for k, one in enumerate(rival.candidates) if one.key != candidate.key]
+    both = fit(
+        problem,
+        [*(rival.candidates[k] for k in others), candidate],
+        [*(rival.values[k] for k in others), values],
+    )
     return both if both.evidence - rival.evidence > INFERENCE.prior_odds else rival
 
 

@@ -248,8 +248,10 @@ def _credibility(made: CampaignFit, candidate: Candidate, estimates: Mapping[str
         return doubt
     if doubt := interval_doubt(candidate.parameters, estimates, _covariance(made, candidate)):
         return doubt
-    if candidate.effect.scales and not made.campaign.hull.known and len(profile.actuators) == 1:
-        return "without a hull model, a factor on the masses and the damping does the same as one on the only actuator"
+    scaled = {one.instance for one in made.campaign.properties if one.effect.scales}
+    if candidate.effect.scales and not made.campaign.hull.known and scaled >= {one.name for one in profile.actuators}:
+        all_of_them = "the only actuator" if len(scaled) == 1 else "all actuators, and each of them has one"
+        return f"without a hull model, a factor on the masses and the damping does the same as one on {all_of_them}"
     without = made.common.copy()
     without[property_rows(made.campaign, candidate)] = 0.0
     return unfelt(felt(made, without, made.own).max(axis=0))

@@ -89,7 +89,8 @@ def campaign_hull(made: CampaignFit) -> RefittedHull:
     moved = (prior.mean + prior.spread * made.common[: len(prior.mean)])[:h]
     profile = made.campaign.members[0].plain.measurements.profile
     return RefittedHull(
-        _farthest(prior.mean[:h], prior.spread[:h], moved), impossible_masses(profile, moved) if prior.known else ()
+        _farthest(prior.mean[:h], prior.spread[:h], moved),
+        impossible_masses(profile, moved) if prior.known else impossible_throughout(profile, moved),
     )
 
 

@@ -16,6 +16,7 @@ from ferryid.diagnose.inference.estimation import (
     Fit,
     fit,
     fitted_force_model,
+    rest_of,
     starting_point,
 )
 from ferryid.diagnose.inference.feedback import OUT_OF_STEP, feedback_of
@@ -85,17 +86,13 @@ def _force_claim(
 ) -> Claim:
     kept, standing = stands.fit, stands.standings[i]
     candidate, values = kept.candidates[i], kept.values[i]
-    others = [j for j in range(len(kept.candidates)) if j != i]
     rivals = tuple(
         Rival(one.candidate.effect.id, one.candidate.instance, one.gain) for one in standing.rivals[:SHOWN_RIVALS]
     )
     unresolved = standing.unresolved(candidate)
     # The hull stays as it is with the finding: refitted without, it would bend to it on axes where it does not act.
-    bare = replace(
-        kept,
-        candidates=tuple(kept.candidates[j] for j in others),
-        values=tuple(kept.values[j] for j in others),
-    )
+    rest, of_rest = rest_of(kept, i)
+    bare = replace(kept, candidates=tuple(rest), values=tuple(of_rest))
     place = locate(problem, bare, kept, measurements)
     estimates = _estimates(problem, candidate, kept, i)
     by_name = dict(zip((p.name for p in candidate.parameters), values.tolist(), strict=True))
@@ -184,10 +181,13 @@ def _lower_ends(proof: Proof) -> dict[str, Any]:
 
 
 def removed_shares(problem: EstimationProblem, stands: Elimination) -> dict[tuple[str, str | None], dict[str, float]]:
-    """Return how much of the held-out squared force error each candidate removes while it acts, by axis."""
+    """Return how much of the held-out squared force error each candidate removes while it acts, by axis.
+
+    Without a step one level holds throughout, which is wrong on either side.
+    """
     times, shares = problem.windows.middle_s, {}
     for proof in () if stands.proof is None else stands.proof.proofs:
-        acts = (times >= proof.candidate.onset_s) & (times < proof.candidate.offset_s)
+        acts = (times >= proof.candidate.onset_s) & (times < proof.candidate.offset_s) | proof.candidate.is_step
         before, after = (np.sum(one[acts] ** 2, axis=0) for one in (proof.improvement.before, proof.improvement.after))
         share = 1.0 - after / np.where(before > 0.0, before, np.inf)
         shares[proof.candidate.key] = dict(zip(AXES, share.tolist(), strict=True))

@@ -25,6 +25,7 @@ from ferryid.diagnose.inference.estimation import (
     Fit,
     fit,
     fitted_force_model,
+    rest_of,
     starting_point,
 )
 from ferryid.diagnose.inference.folds import Folds, by_block, draws, folds_of, subset
@@ -294,9 +295,7 @@ def imitable(problem: EstimationProblem, candidate: Candidate, placebo: Candidat
 
 def _proof(problem: EstimationProblem, folds: Folds, found: Fit, full: HeldOut, base: HeldOut, index: int) -> Proof:
     candidate, values = found.candidates[index], found.values[index]
-    others = [k for k in range(len(found.candidates)) if k != index]
-    rest = [found.candidates[k] for k in others]
-    start = [found.values[k] for k in others]
+    rest, start = rest_of(found, index)
     without = held_out(problem, folds, rest, start, found) if rest else base
     made = compare_held_out(problem, folds, without, full)
     in_its_place = placebos(problem, candidate, values)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import islice
 from math import isfinite, nan
 
 import numpy as np
@@ -12,9 +13,11 @@ from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.data.measurements import Survey
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, effect_slopes, fit
 from ferryid.diagnose.inference.stochastic_disturbance import DisturbanceState
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.claims import Key
 from ferryid.diagnose.judging.credibility import IN_THE_HULL, refitted_hull
 from ferryid.diagnose.judging.finding import Finding
+from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.models import Quantity, Source, StoredEffect
 from ferryid.types import Floats
@@ -125,6 +128,11 @@ def posterior_of(
             )
             # A fault that passed within the log is no property that others have.
             lasts = candidate.effect.vessel and source.offset_s is None
+            if candidate.is_step:
+                level = _level(kept, i, source) if lasts else _level_otherwise(kept, i, source)
+                stored.append((True, level))
+                if lasts:
+                    continue
             unreported = candidate.effect.unreported(problem.plain.measurements, kept.values[i])
             errors = [
                 nan if one.name in unreported else error
@@ -171,13 +179,34 @@ def stored_effect(
 ) -> StoredEffect:
     """Return an effect with its intervals: those that were told, or of these errors, unknown (NaN) where they are."""
     parameters = {}
-    for one, value, error in zip(candidate.parameters, values.tolist(), errors, strict=True):
+    own = zip(candidate.parameters, values.tolist(), errors, strict=True)
+    # The level from which a step goes is no part of it.
+    for one, value, error in islice(own, 1 if candidate.is_step else None):
         # With the limit second, what is unknown stays so.
         low, high = max(value - 1.96 * error, one.low), min(value + 1.96 * error, one.high)
         if one.name in reported:
             low, high = min(reported[one.name].low, value), max(reported[one.name].high, value)
         parameters[one.name] = Quantity(value, low, high, one.unit)
     return StoredEffect(candidate.effect.id, candidate.instance, parameters, (source,))
+
+
+def _level(kept: Fit, index: int, source: Source) -> StoredEffect:
+    """Return the level to which a step of a fit leads, as a property that the vessel has from then on."""
+    factor, otherwise = kept.values[index].tolist()
+    slopes = INFERENCE.posterior_factor * np.array([otherwise, factor])
+    error = float(np.sqrt(slopes @ kept.covariance(index) @ slopes))
+    return _of_level(kept.candidates[index], factor * otherwise, error, source)
+
+
+def _level_otherwise(kept: Fit, index: int, source: Source) -> StoredEffect:
+    """Return the level to which a step of a fit returns, as a property that the vessel has all along."""
+    level, error = kept.values[index][1], kept.reported_errors(index)[1]
+    return _of_level(kept.candidates[index], float(level), float(error), replace(source, onset_s=None, offset_s=None))
+
+
+def _of_level(step: Candidate, level: float, error: float, source: Source) -> StoredEffect:
+    factor = replace(step, effect=effects()[step.effect.id], parameters=step.parameters[:1])
+    return stored_effect(factor, np.array([level]), [error], {}, source)
 
 
 def _hull(problem: EstimationProblem, kept: Fit) -> HullPosterior:

@@ -97,7 +97,9 @@ def select_law(problem: EstimationProblem, kept: Fit, folds: Folds, unlike: Floa
         What an effect moves the gaps by, shape (J, c): no term that says the same, as a share of a thruster's force says what a
         weak thruster does. Any will do where None.
     """
-    terms = list(terms_of(problem.plain.measurements))
+    # Of the level of a step anything may be true, as of the hull.
+    levels = {(f"force of {one.instance}", "1") for one in kept.candidates if one.is_step}
+    terms = [one for one in terms_of(problem.plain.measurements) if one.key not in levels]
     if unlike is not None:
         terms = _unlike(problem, kept, terms, unlike)
     chosen: list[Term] = []

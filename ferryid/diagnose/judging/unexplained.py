@@ -15,7 +15,7 @@ import numpy as np
 from ferryid.counts import counted
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.candidate_terms import FORCE, Term
-from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fit, fitted_force_model
+from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fit, fitted_force_model, rest_of
 from ferryid.diagnose.inference.folds import Folds, block_s, folds_of
 from ferryid.diagnose.inference.force_errors import force_errors, position_errors
 from ferryid.diagnose.inference.onset_estimation import is_brief
@@ -168,8 +168,7 @@ def find_displaced(problem: EstimationProblem, kept: Fit) -> tuple[int, ...]:
 
 
 def _displaced(problem: EstimationProblem, kept: Fit, index: int, folds: Folds) -> bool:
-    others = [k for k in range(len(kept.candidates)) if k != index]
-    rest, start = [kept.candidates[k] for k in others], [kept.values[k] for k in others]
+    rest, start = rest_of(kept, index)
     without = fit(problem, rest, start)
     named = problem.windows.gap(fitted_force_model(problem.plain, kept))
     bare = replace(kept, candidates=tuple(rest), values=tuple(start))

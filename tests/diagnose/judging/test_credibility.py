@@ -14,7 +14,7 @@ import pytest
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.thresholds import INFERENCE
-from ferryid.diagnose.judging import conclude
+from ferryid.diagnose.judging import campaign_properties, conclude
 from ferryid.diagnose.judging.campaign_conditions import ConditionTest
 from ferryid.diagnose.judging.campaign_evidence import Gain, HeldOutLoss
 from ferryid.diagnose.judging.campaign_properties import PropertyTest
@@ -153,8 +153,9 @@ def test_what_sets_in_is_a_hint_where_the_hull_beside_the_sure_findings_cannot_b
 
 
 def test_the_hull_of_a_campaign_is_doubted_as_that_of_a_log_is() -> None:
-    def doubted(deviations: float, *, known: bool) -> str:
-        common = np.where(np.array([*COEFFICIENTS, "X_vr", "X_vv"]) == "m11", deviations, 0.0)
+    def doubted(deviations: float, *names: str, known: bool) -> str:
+        moved = np.isin([*COEFFICIENTS, "X_vr", "X_vv"], names or ("m11",))
+        common = np.where(moved, deviations, 0.0)
         prior = SimpleNamespace(mean=np.append(HULL, [0.0, 0.0]), spread=np.append(SPREAD, [1.0, 1.0]), known=known)
         member = SimpleNamespace(plain=SimpleNamespace(measurements=SimpleNamespace(profile=FERRY)))
         campaign = SimpleNamespace(hull=prior, members=(member,))
@@ -165,6 +166,35 @@ def test_the_hull_of_a_campaign_is_doubted_as_that_of_a_log_is() -> None:
     # Of a hull that nobody has modelled, the logs may say little of the mass.
     assert doubted(-6.0, known=False) == ""
     assert "moves by 11 prior" in doubted(11.0, known=False)
+    # Thrusters that push a vessel without a mass are not the vessel's.
+    assert "which no hull has" in doubted(-9.0, "m11", "m22", "m33", known=False)
+
+
+@pytest.mark.parametrize(
+    ("scaled", "known", "told"),
+    [
+        (("thruster1", "thruster2"), False, "on all actuators, and each of them has one"),
+        (("thruster1",), False, ""),
+        (("thruster1", "thruster2"), True, ""),
+    ],
+)
+def test_a_factor_on_every_actuator_is_one_on_masses_that_nobody_knows(
+    monkeypatch: pytest.MonkeyPatch, scaled: tuple[str, ...], known: bool, told: str
+) -> None:
+    gains = tuple(Candidate.of(effects()["thruster_gain"], name, FERRY) for name in scaled)
+    member = SimpleNamespace(plain=SimpleNamespace(measurements=SimpleNamespace(profile=FERRY)))
+    campaign = SimpleNamespace(properties=gains, hull=SimpleNamespace(known=known), members=(member,))
+    made = SimpleNamespace(campaign=campaign, common=np.zeros(40), own=())
+    for name, value in (
+        ("_covariance", np.eye(1)),
+        ("property_rows", slice(0, 1)),
+        ("felt", np.ones((1, 3))),
+        ("unfelt", ""),
+    ):
+        monkeypatch.setattr(campaign_properties, name, lambda *_, value=value: value)
+    said = campaign_properties._credibility(cast(Any, made), gains[0], {"factor": Estimate(0.04, -0.07, 0.15, "-")})
+    assert said.endswith(told)
+    assert bool(said) == bool(told)
 
 
 @pytest.mark.parametrize("kind", ["force", "disturbance", "condition", "property", "sensor"])
