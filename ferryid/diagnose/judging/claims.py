@@ -126,6 +126,9 @@ class LogFigures:
     hull_doubt, common_hull_doubt
         Why the hull that was refitted to the log, and the one that was fitted to all logs of a campaign, cannot be the
         vessel's, as the end of a sentence; empty where they can.
+    removed
+        Share of the held-out squared force error that all findings on forces together remove, by axis, the hull refitted with
+        them and without; empty where nothing was held out.
     jumping
         ``"position"`` or ``"heading"``, where it jumps too often to know which samples are wrong.
     """
@@ -140,4 +143,5 @@ class LogFigures:
     circumstances: Circumstances = ANYWHERE
     hull_doubt: str = ""
     common_hull_doubt: str = ""
+    removed: Mapping[str, float] = field(default_factory=dict)
     jumping: tuple[str, ...] = ()

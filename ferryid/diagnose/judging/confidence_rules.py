@@ -233,6 +233,15 @@ def worse_on_an_axis(finding: Finding, context: Context, threshold: float) -> Ou
     )
 
 
+@rule(JUDGING.worsening, "of the held-out squared force error")
+def worse_altogether(finding: Finding, context: Context, threshold: float) -> Outcome:
+    """Lower all forces of a log in which, with all of them, every axis is worse by more than this: one is judged beside all."""
+    removed = context.log.removed
+    if context.own.kind != "force" or not removed or max(removed.values()) >= -threshold:
+        return finding, ""
+    return _because(finding, "all findings together make the held-out squared force error larger on every axis")
+
+
 @rule(JUDGING.least_removed, "of the held-out squared force error", of_name=True)
 def removes_little(finding: Finding, context: Context, threshold: float) -> Outcome:
     """Lower what removes less than this on every axis while it acts: hull and formulas may be as much off."""
@@ -462,6 +471,7 @@ RULES: tuple[ConfidenceRule, ...] = (
     place_visited_once,
     passes_by_little,
     worse_on_an_axis,
+    worse_altogether,
     removes_little,
     less_than_is_unexplained,
     hull_from_this_log,

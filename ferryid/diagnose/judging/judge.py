@@ -93,6 +93,7 @@ def _judged(
         baseline_sensors=baseline.sensors,
         circumstances=Circumstances.of(measurements.profile),
         hull_doubt=refitted_hull(problem, stands.fit, known=baseline.hull_known).doubt,
+        removed={} if stands.proof is None else dict(zip(AXES, stands.proof.whole.removed.tolist(), strict=True)),
         jumping=log.estimated.averaged.screened.measured.survey.jumping,
     )
     return JudgedLog(log, base, stands, unknown, claims, figures)

@@ -40,6 +40,7 @@ from ferryid.diagnose.judging.confidence_rules import (
     too_brief,
     unexplained_shares,
     with_another_force,
+    worse_altogether,
     worse_on_an_axis,
 )
 from ferryid.diagnose.judging.finding import UNKNOWN, Finding, LawTerm
@@ -65,7 +66,7 @@ def on(kind: Kind, **figures: object) -> Context:
 
 def test_every_rule_has_a_name_a_line_and_its_unit() -> None:
     names = [one.name for one in RULES]
-    assert len(names) == len(set(names)) == 25
+    assert len(names) == len(set(names)) == 26
     for one in RULES:
         assert one.about.endswith((".", ":", ",")) or one.about, one.name
         assert (one.threshold is None) == (one.unit == ""), one.name
@@ -198,6 +199,16 @@ def test_what_makes_an_axis_worse_is_a_hint_and_the_axis_is_named() -> None:
     _, note = worse_on_an_axis(found("wind"), on("force", removed={"surge": 0.6, "yaw": -3.33}))
     assert note == "Steady wind is a hint: it makes the held-out squared force error in yaw 333 % larger."
     assert stands(worse_on_an_axis, found(UNKNOWN, yaw=-0.5), on("law"))
+
+
+def test_where_all_findings_together_make_every_axis_worse_none_of_them_is_sure() -> None:
+    """Figures of a catamaran's log, in which a load was named beside thrusters of a tenth of their force, and one axis less."""
+    worse = {"surge": -9.7, "sway": -21.0, "yaw": -15.4}
+    for removed, sure in ((worse, False), (worse | {"yaw": -0.2}, True), (worse | {"yaw": -0.21}, False), ({}, True)):
+        context = replace(on("force"), log=LogFigures(removed=removed))
+        assert stands(worse_altogether, found("payload", surge=0.8), context) == sure
+    # A sensor's error is seen by other means.
+    assert stands(worse_altogether, found("clock_offset"), replace(on("sensor"), log=LogFigures(removed=worse)))
 
 
 def test_what_removes_hardly_anything_of_the_error_is_a_hint() -> None:
