@@ -216,6 +216,18 @@ def test_a_hint_that_the_recording_has_already_is_not_noticed() -> None:
     assert scores.noticed_recoveries[0].found == 0
 
 
+def test_a_step_is_measured_from_the_level_that_the_recording_has() -> None:
+    """A factor on a thruster that gives 90 % by itself is multiplied with that; a step to it is not."""
+    weak = Truth("thruster_gain", "port", {"factor": 0.8}, 100.0)
+    own = finding("thruster_gain", {"factor": 0.9}, 0.05, "port", p=0.5)
+    for parameters in ({"factor": 0.8, "otherwise": 0.9}, {"factor": 0.72}):
+        found = finding("thruster_gain", parameters, 0.05, "port", onset=101.0)
+        scores = score_recorded([plain([own]), case((weak,), [found], kind="span", level=None)], [])
+        every = scores.recoveries[0]
+        assert every.errors == pytest.approx([0.0], abs=1e-9)
+        assert every.in_time.value == 1.0
+
+
 def test_an_effect_that_began_within_a_recording() -> None:
     weak = Truth("thruster_gain", "port", {"factor": 0.8}, 100.0)
     hint = finding("thruster_gain", {"factor": 0.82}, 0.05, "port", p=0.5, onset=103.0)

@@ -29,6 +29,8 @@ TWICE_SEEN = 2.0
 """Of the oracle's size, from which on it is said why an effect was missed."""
 GROSS = "gross"
 """Kind of the cases whose record is wrong altogether."""
+STEP_LEVEL = "otherwise"
+"""Parameter that a finding has beside the factor of a step, from a level that nobody knows."""
 MEDIAN_ERROR = 0.05
 """Median relative error of parameters that is allowed."""
 
@@ -353,7 +355,12 @@ def difference(result: CaseResult, plain: CaseResult, own: OwnErrors | None = No
     known, concealed = set(names(plain)), {truth.key for truth in result.truths}
     kept = tuple(one for one in result.diagnosis.findings if one.key not in known or one.key in concealed)
     case = replace(result.case, allowed=(*result.case.allowed, HULL))
-    realised = {truth.effect: expected(truth, plain, own or {}) for truth in result.truths}
+    steps = {one.key for one in result.diagnosis.findings if STEP_LEVEL in one.parameters}
+    # A step goes from whatever level the recording has by itself.
+    realised = {
+        truth.effect: dict(truth.values) if truth.key in steps else expected(truth, plain, own or {})
+        for truth in result.truths
+    }
     return replace(result, case=case, realised=realised, diagnosis=replace(result.diagnosis, findings=kept))
 
 
