@@ -49,6 +49,9 @@ _SIDES = (
     "centre",
     "mid",
 )
+_SHORT_SIDES = {"stbd": "starboard", "stb": "starboard", "sb": "starboard"}
+_LETTERS = {"p": ("s", "port"), "s": ("p", "starboard"), "l": ("r", "left"), "r": ("l", "right")}
+"""Letters of sides: each with that of the other side, and what it means."""
 _BUS = frozenset({"motors", "lli", "can", "bus", "serial", "servo", "servos", "actuation"})
 _SELECTORS = ("id", "channel", "index", "node", "number")
 _VALUES = ("data", "value", "val", "setpoint", "pwm", "command", "cmd")
@@ -95,6 +98,10 @@ _UNRELATED = frozenset(
 _MARKS = frozenset(
     {*_BASES, *_SIDES, *_RUDDER, "rpm", "azi", "thrust", "pwm", "lpwm", "rpwm", "thrusters", "actuators"}
 )
+_SAME = frozenset(
+    {"raw", "filtered", "filt", "smooth", "smoothed", "mean", "average", "avg", "min", "max", "data", "value"}
+)
+"""Words by which two fields of one actuator differ."""
 
 
 @dataclass(frozen=True)
@@ -141,15 +148,16 @@ class ActuatorField:
 
 def actuator_fields(topics: Sequence[Topic]) -> list[ActuatorField]:
     """Return the fields of actuators in the order of the log, each with the actuator that it belongs to."""
-    found = []
+    found: list[ActuatorField] = []
+    paired = _paired(topics)
     for topic in topics:
-        around = () if topic.name == "table" else _split(words_of(topic.name))
+        around = () if topic.name == "table" else _sided(words_of(topic.name), paired)
         if topic.count < 2 or set(around) & (_UNRELATED | {"odometry", "navigation"}):
             continue
         fields = numeric_fields(topic)
         bare = {words[0] for words in fields.values() if len(words) == 1}
         for path, own in fields.items():
-            words = _split(own)
+            words = _sided(own, paired)
             every = (*around, *words)
             marked = bool(set(every) & _MARKS) or (
                 topic.encoding == "table" and words == ("n",) and "rudder" in bare and "e" not in bare
@@ -165,7 +173,70 @@ def actuator_fields(topics: Sequence[Topic]) -> list[ActuatorField]:
     if names == {"azimuth", "propeller"}:
         # One speed and one angle without a number: one thruster.
         found = [replace(one, actuator="azimuth") for one in found]
-    return found
+    return _apart(found, paired)
+
+
+def _paired(topics: Sequence[Topic]) -> frozenset[tuple[str, ...]]:
+    """Return the names of topics and fields, as words, that another has but for a letter of the other side."""
+    names = {words_of(topic.name) for topic in topics} | {
+        words for topic in topics for words in numeric_fields(topic).values()
+    }
+    return frozenset(
+        words
+        for words in names
+        for k, word in enumerate(words)
+        if word in _LETTERS and (*words[:k], _LETTERS[word][0], *words[k + 1 :]) in names
+    )
+
+
+def _sided(words: tuple[str, ...], paired: frozenset[tuple[str, ...]]) -> tuple[str, ...]:
+    """Return words with their sides written out: a letter is one beside a word of an actuator, where its pair is there too.
+
+    A lone p or r is a roll rate or a yaw rate, and delta_r a rudder angle.
+    """
+    parted = _split(words)
+    letters = words in paired and bool({*parted} & (_MARKS | {"n"}))
+    return tuple(_LETTERS[word][1] if letters and word in _LETTERS else _SHORT_SIDES.get(word, word) for word in parted)
+
+
+def _apart(fields: Sequence[ActuatorField], paired: frozenset[tuple[str, ...]]) -> list[ActuatorField]:
+    """Return fields, those that would be the same signal of one actuator named after the words by which they differ.
+
+    Where the actuator has other signals, its first field keeps the name. Fields that differ by words as raw and filtered
+    are those of one actuator.
+    """
+    alike: dict[tuple[str, str, bool], list[ActuatorField]] = {}
+    for one in fields:
+        alike.setdefault((one.actuator, one.role, one.order is True), []).append(one)
+    roles = {one.actuator: {other.role for other in fields if other.actuator == one.actuator} for one in fields}
+    names: dict[str, str] = {}
+    for (actuator, _, _), group in alike.items():
+        rests = [_rest(one, paired) for one in group]
+        first = len(group) > 1 and len(roles[actuator]) > 1
+        for one, rest in zip(group[first:], rests[first:], strict=True):
+            if rest and len(set(rests)) > 1:
+                names[one.label] = "_".join((actuator, *rest))
+    return [replace(one, actuator=names.get(one.label, one.actuator)) for one in fields]
+
+
+def _rest(field: ActuatorField, paired: frozenset[tuple[str, ...]]) -> tuple[str, ...]:
+    """Return the words of a field's name that say neither its actuator nor what it is."""
+    said = {
+        *_SPEED,
+        *_ANGLE,
+        *_RUDDER,
+        *_FORCE,
+        *_DUTY,
+        *_BASES,
+        *_FEEDBACK,
+        *_SAME,
+        *ORDERS,
+        *field.actuator.split("_"),
+    }
+    around = () if field.topic == "table" else _sided(words_of(field.topic), paired)
+    every = (*around, *_sided(words_of(field.path), paired))
+    # The number of an actuator stands behind its name.
+    return tuple(word for word in dict.fromkeys(every) if word not in said and not field.actuator.endswith(word))
 
 
 @dataclass(frozen=True)

@@ -510,3 +510,41 @@ def test_a_velocity_along_the_axes_of_the_position_leaves_open_which_is_the_head
     for rate_of, slope_of in (("col3", "col0"), ("col4", "col1"), ("col5", "col2")):
         assert f"{rate_of} follows the slope of {slope_of}" in str(refused.value)
     assert "turned by" not in str(refused.value)
+
+
+def two_thrusters(first: str, second: str) -> Columns:
+    """Return a trial whose speed stands in two columns of these names."""
+    c = sailed(60.0)
+    return {"t": c["t"], "N": c["N"], "E": c["E"], "psi": c["psi"], "r": c["r"], first: c["n"] + 9.0 * c["rudder"],
+            second: c["n"] - 9.0 * c["rudder"]}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("columns", "names"),
+    [
+        (("n_port", "n_stb"), ["port", "starboard"]),
+        (("n_p", "n_s"), ["port", "starboard"]),
+        (("thruster_p", "thruster_s"), ["port", "starboard"]),
+        (("PWM port", "PWM stbd"), ["port", "starboard"]),
+        (("thrust_sb", "thrust_port"), ["starboard", "port"]),
+        (("rpm_l", "rpm_r"), ["left", "right"]),
+        (("rpm_main", "rpm_auxiliary"), ["propeller_main", "propeller_auxiliary"]),
+        # Once filtered and once as measured it is one propeller.
+        (("rpm", "rpm_filtered"), ["propeller"]),
+    ],
+)
+def test_two_thrusters_are_two_actuators(tmp_path: Path, columns: tuple[str, str], names: list[str]) -> None:
+    draft, found = drafted(tmp_path, two_thrusters(*columns))
+    assert [one.name for one in draft.actuators] == names
+    assert found["yaw_rate"].fields == ("r",)
+
+
+def test_of_two_propellers_with_one_rudder_the_first_keeps_it(tmp_path: Path) -> None:
+    columns = two_thrusters("rpm_main", "rpm_auxiliary") | {"rudder": sailed(60.0)["rudder"]}
+    _, found = drafted(tmp_path, columns)
+    assert {one for one in found if "." in one} == {"propeller.speed", "propeller.rudder", "propeller_auxiliary.speed"}
+
+
+def test_a_letter_is_a_side_only_beside_its_other_side(tmp_path: Path) -> None:
+    draft, _ = drafted(tmp_path, {**in_ned(sailed()), "delta_r": sailed()["rudder"]})
+    assert [one.name for one in draft.actuators] == ["propeller"]
