@@ -20,7 +20,7 @@ _ANGLE = frozenset({"azimuth", "azi", "angle", "alpha", "direction", "steering",
 _RUDDER = frozenset({"rudder", "delta"})
 _FORCE = frozenset({"force", "thrust", "newton", "thruster"})
 _DUTY = frozenset({"pwm", "throttle", "duty", "percent"})
-_BASES = (
+BASES = (
     "thruster",
     "propeller",
     "prop",
@@ -34,7 +34,7 @@ _BASES = (
     "esc",
     "rudder",
 )
-_SIDES = (
+SIDES = (
     "stern",
     "aft",
     "bow",
@@ -58,7 +58,7 @@ _VALUES = ("data", "value", "val", "setpoint", "pwm", "command", "cmd")
 _MOST_SHARED = 16
 """Actuators on one topic."""
 _FEEDBACK = frozenset({"state", "feedback", "actual", "measured", "encoder", "status"})
-_UNRELATED = frozenset(
+UNRELATED = frozenset(
     [
         "desired",
         "error",
@@ -95,9 +95,7 @@ _UNRELATED = frozenset(
         "camera",
     ]
 )
-_MARKS = frozenset(
-    {*_BASES, *_SIDES, *_RUDDER, "rpm", "azi", "thrust", "pwm", "lpwm", "rpwm", "thrusters", "actuators"}
-)
+_MARKS = frozenset({*BASES, *SIDES, *_RUDDER, "rpm", "azi", "thrust", "pwm", "lpwm", "rpwm", "thrusters", "actuators"})
 _SAME = frozenset(
     {"raw", "filtered", "filt", "smooth", "smoothed", "mean", "average", "avg", "min", "max", "data", "value"}
 )
@@ -124,6 +122,8 @@ class ActuatorField:
         Fields and values of the messages that are its own, on a topic that carries several actuators.
     setting
         What the parameters of an autopilot state of it; None where they do not.
+    assumed
+        What is assumed of it, as its name does not state it; empty where it does.
     """
 
     actuator: str
@@ -134,6 +134,7 @@ class ActuatorField:
     rate_hz: float
     where: tuple[tuple[str, float], ...] = ()
     setting: OutputSetting | None = None
+    assumed: str = ""
 
     @property
     def stream(self) -> str:
@@ -149,20 +150,20 @@ class ActuatorField:
 def actuator_fields(topics: Sequence[Topic]) -> list[ActuatorField]:
     """Return the fields of actuators in the order of the log, each with the actuator that it belongs to."""
     found: list[ActuatorField] = []
-    paired = _paired(topics)
+    paired = paired_names(topics)
     for topic in topics:
-        around = () if topic.name == "table" else _sided(words_of(topic.name), paired)
-        if topic.count < 2 or set(around) & (_UNRELATED | {"odometry", "navigation"}):
+        around = () if topic.name == "table" else sided(words_of(topic.name), paired)
+        if topic.count < 2 or set(around) & (UNRELATED | {"odometry", "navigation"}):
             continue
         fields = numeric_fields(topic)
         bare = {words[0] for words in fields.values() if len(words) == 1}
         for path, own in fields.items():
-            words = _sided(own, paired)
+            words = sided(own, paired)
             every = (*around, *words)
             marked = bool(set(every) & _MARKS) or (
                 topic.encoding == "table" and words == ("n",) and "rudder" in bare and "e" not in bare
             )
-            if not marked or set(words) & _UNRELATED:
+            if not marked or set(words) & UNRELATED:
                 continue
             role = _role(words, around)
             if role:
@@ -176,7 +177,7 @@ def actuator_fields(topics: Sequence[Topic]) -> list[ActuatorField]:
     return _apart(found, paired)
 
 
-def _paired(topics: Sequence[Topic]) -> frozenset[tuple[str, ...]]:
+def paired_names(topics: Sequence[Topic]) -> frozenset[tuple[str, ...]]:
     """Return the names of topics and fields, as words, that another has but for a letter of the other side."""
     names = {words_of(topic.name) for topic in topics} | {
         words for topic in topics for words in numeric_fields(topic).values()
@@ -189,7 +190,7 @@ def _paired(topics: Sequence[Topic]) -> frozenset[tuple[str, ...]]:
     )
 
 
-def _sided(words: tuple[str, ...], paired: frozenset[tuple[str, ...]]) -> tuple[str, ...]:
+def sided(words: tuple[str, ...], paired: frozenset[tuple[str, ...]]) -> tuple[str, ...]:
     """Return words with their sides written out: a letter is one beside a word of an actuator, where its pair is there too.
 
     A lone p or r is a roll rate or a yaw rate, and delta_r a rudder angle.
@@ -227,14 +228,14 @@ def _rest(field: ActuatorField, paired: frozenset[tuple[str, ...]]) -> tuple[str
         *_RUDDER,
         *_FORCE,
         *_DUTY,
-        *_BASES,
+        *BASES,
         *_FEEDBACK,
         *_SAME,
         *ORDERS,
         *field.actuator.split("_"),
     }
-    around = () if field.topic == "table" else _sided(words_of(field.topic), paired)
-    every = (*around, *_sided(words_of(field.path), paired))
+    around = () if field.topic == "table" else sided(words_of(field.topic), paired)
+    every = (*around, *sided(words_of(field.path), paired))
     # The number of an actuator stands behind its name.
     return tuple(word for word in dict.fromkeys(every) if word not in said and not field.actuator.endswith(word))
 
@@ -330,9 +331,9 @@ def _order(words: Sequence[str], role: str) -> bool | None:
 
 def _name(words: Sequence[str], role: str) -> str:
     """Return the name of an actuator: side and number, or what it is where there is but one."""
-    sides = [word for word in dict.fromkeys(words) if word in _SIDES]
+    sides = [word for word in dict.fromkeys(words) if word in SIDES]
     number = next((word for word in words if word.isdigit()), "")
-    base = next((word for word in words if word in _BASES), "")
+    base = next((word for word in words if word in BASES), "")
     base = {"prop": "propeller", "azi": "azimuth"}.get(base, base)
     if sides:
         return "_".join(sides) + number

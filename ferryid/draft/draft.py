@@ -9,7 +9,8 @@ from pathlib import Path
 from ferryid.draft.actuator_fields import actuator_fields, parted, shared_topics
 from ferryid.draft.actuators import UNKNOWN_ORDER, DraftedActuator, drafted_actuators
 from ferryid.draft.autopilots import Orders, autopilot_fields, autopilot_groups, changing, orders, with_frames
-from ferryid.draft.fields import navigation_groups
+from ferryid.draft.fields import FieldGroup, navigation_groups
+from ferryid.draft.guessed_orders import guessed_orders
 from ferryid.draft.kinematics import navigation_signals
 from ferryid.draft.mapped import MappedSignal
 from ferryid.draft.samples import read_samples
@@ -93,13 +94,15 @@ def draft_profile(log: str | Path, like: Profile | None = None, ranges: TimeRang
             f"{log}: its columns have no names, so that nothing shows what they are. Fix: add a header row, or give --like a "
             "profile whose [table] has columns"
         )
+    # What names its actuators by numbers is of use only where none has a name.
+    shared = [] if fields else shared_topics(topics)
+    if groups and not shared and not autopilot:
+        fields = [*fields, *guessed_orders(topics, fields)]
     wanted: dict[str, list[str]] = {}
     for group in groups:
         wanted.setdefault(group.topic, []).extend(group.fields)
     for field in fields:
         wanted.setdefault(field.topic, []).append(field.path)
-    # What names its actuators by numbers is of use only where none has a name.
-    shared = [] if fields else shared_topics(topics)
     for bus in shared:
         wanted.setdefault(bus.topic, []).extend((*bus.selectors, bus.value))
     for topic, speed, direction in winds:
@@ -115,7 +118,7 @@ def draft_profile(log: str | Path, like: Profile | None = None, ranges: TimeRang
     samples = read_samples(reader, wanted, str(log), ranges)
     looked_for = fields
     driven = orders(fields, samples, parameters_of(reader)) if autopilot else Orders(tuple(fields))
-    fields = list(driven.fields)
+    fields = [one for one in driven.fields if not one.assumed or changing([one], samples)]
     for bus in shared:
         more, samples = parted(bus, samples)
         fields += more
@@ -131,8 +134,7 @@ def draft_profile(log: str | Path, like: Profile | None = None, ranges: TimeRang
         what = (
             f"nothing that looks like an actuator ever changes, found {_listed(still)}"
             if still
-            else "no field looks like an actuator's speed, angle, force or order, found the topics "
-            f"{_listed([one.name for one in topics])}"
+            else f"no field looks like an actuator's speed, angle, force or order, found {_other(topics, groups)}"
         )
         raise FerryIdError(
             f"{log}: {what}{''.join(f'; {one}' for one in driven.remarks)}. Fix: record "
@@ -189,6 +191,16 @@ def _nothing(topics: Sequence[Topic]) -> str:
 def _fields(topics: Sequence[Topic]) -> list[str]:
     """Return the names of topics, and of the columns where the log is a table."""
     return [path for one in topics for path in ((*one.fields,) if one.name == "table" else (one.name,))]
+
+
+def _other(topics: Sequence[Topic], groups: Sequence[FieldGroup]) -> str:
+    """Return the topics, and of a table the columns that are no pose or velocity, for an error."""
+    if all(one.name != "table" for one in topics):
+        return f"the topics {_listed([one.name for one in topics])}"
+    taken = {path for one in groups if one.topic == "table" for path in one.fields}
+    # The columns that a time was guessed from stand in the note of their table.
+    taken |= {path for one in topics for path in one.fields if f'"{path}"' in one.note}
+    return f"beside pose and velocity the columns {_listed([one for one in _fields(topics) if one not in taken])}"
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -548,3 +548,68 @@ def test_of_two_propellers_with_one_rudder_the_first_keeps_it(tmp_path: Path) ->
 def test_a_letter_is_a_side_only_beside_its_other_side(tmp_path: Path) -> None:
     draft, _ = drafted(tmp_path, {**in_ned(sailed()), "delta_r": sailed()["rudder"]})
     assert [one.name for one in draft.actuators] == ["propeller"]
+
+
+@pytest.mark.parametrize(
+    ("columns", "names"),
+    [
+        (("cmd_port", "cmd_stbd"), ["port", "starboard"]),
+        (("thr_left", "thr_right"), ["left", "right"]),
+        (("left_thr", "right_thr"), ["left", "right"]),
+        (("motor_l", "motor_r"), ["left", "right"]),
+        (("servo1_raw", "servo3_raw"), ["output1", "output3"]),
+        (("T1", "T2"), ["actuator1", "actuator2"]),
+        (("u1", "u2"), ["actuator1", "actuator2"]),
+        (("RCOU.C1", "RCOU.C3"), ["output1", "output3"]),
+    ],
+)
+def test_what_may_be_an_order_to_a_thruster_is_drafted_as_one_to_be_checked(
+    tmp_path: Path, columns: tuple[str, str], names: list[str]
+) -> None:
+    draft, found = drafted(tmp_path, two_thrusters(*columns))
+    assert [one.name for one in draft.actuators] == names
+    orders = [found[f"{name}.speed.command"] for name in names]
+    assert all("a share of full power is assumed" in one.doubts[0] for one in orders)
+    assert found["yaw_rate"].fields == ("r",)
+
+
+@pytest.mark.parametrize("topic", ["thrusters/{}/cmd", "heron/thrusters/{}/input", "motor/{}", "{}/cmd"])
+def test_a_topic_of_side_and_order_is_an_order_to_be_checked(tmp_path: Path, topic: str) -> None:
+    c = sailed(60.0)
+    np.savetxt(tmp_path / "nav.csv", np.column_stack([c[name] for name in ("t", "N", "E", "psi", "r")]), "%.6g", ",",
+               header="t,N,E,psi,r", comments="")  # fmt: skip
+    for side, share in (("port", c["n"] / 1000.0), ("starboard", c["n"] / 1100.0)):
+        place = tmp_path / f"{topic.format(side)}.csv"
+        place.parent.mkdir(parents=True, exist_ok=True)
+        np.savetxt(place, np.column_stack([c["t"], share]), "%.6g", ",", header="t,data", comments="")
+    draft = draft_profile(tmp_path)
+    assert [one.name for one in draft.actuators] == ["port", "starboard"]
+    assert all("a share of full power is assumed" in one.signals[0].doubts[0] for one in draft.actuators)
+
+
+@pytest.mark.parametrize(
+    ("more", "kept"),
+    [
+        # A temperature, a current, a network port, and one number alone.
+        (("motor_l [degC]", "motor_r [degC]"), 1),
+        (("motor_current_l", "motor_current_r"), 1),
+        (("cmd_port", "cmd_vel"), 1),
+        (("T1", "T2"), 1),
+    ],
+)
+def test_beside_a_thruster_with_a_name_nothing_is_guessed(tmp_path: Path, more: tuple[str, str], kept: int) -> None:
+    columns = two_thrusters(*more) | {"rpm": sailed(60.0)["n"]}
+    draft, _ = drafted(tmp_path, columns)
+    assert len(draft.actuators) == kept
+
+
+def test_a_guessed_order_that_never_changes_is_left_out(tmp_path: Path) -> None:
+    columns = two_thrusters("servo1_raw", "servo3_raw")
+    columns |= {"servo2_raw": np.full(columns["t"].size, 1500.0)}
+    draft, _ = drafted(tmp_path, columns)
+    assert [one.name for one in draft.actuators] == ["output1", "output3"]
+
+
+def test_columns_among_which_no_actuator_is_found_are_named(tmp_path: Path) -> None:
+    with pytest.raises(FerryIdError, match=r"beside pose and velocity the columns left_knob, right_knob\. Fix"):
+        drafted(tmp_path, two_thrusters("left_knob", "right_knob"))
