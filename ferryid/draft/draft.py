@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -88,6 +89,7 @@ def draft_profile(log: str | Path, like: Profile | None = None, ranges: TimeRang
     topics = reader.topics
     autopilot = autopilot_fields(topics)
     groups = with_frames([*navigation_groups(topics), *autopilot_groups(topics)], topics)
+    groups = _with_usual_frames(groups, topics, like)
     fields, winds = autopilot or actuator_fields(topics), wind_fields(topics)
     if not groups and not fields and any("named by their place" in topic.note for topic in topics):
         raise FerryIdError(
@@ -191,6 +193,22 @@ def _nothing(topics: Sequence[Topic]) -> str:
 def _fields(topics: Sequence[Topic]) -> list[str]:
     """Return the names of topics, and of the columns where the log is a table."""
     return [path for one in topics for path in ((*one.fields,) if one.name == "table" else (one.name,))]
+
+
+def _with_usual_frames(groups: Sequence[FieldGroup], topics: Sequence[Topic], like: Profile | None) -> list[FieldGroup]:
+    """Return groups with the frame that holds where motion leaves NED and ENU open: of a like profile, or of the message."""
+    usual = {
+        one.name: ("ENU", f"ENU is the convention of {one.type} (REP 103)")
+        for one in topics
+        if re.fullmatch(r"nav_msgs/(msg/)?Odometry", one.type)
+    }
+    for signal in () if like is None else like.signals:
+        if signal.quantity in ("position", "heading") and signal.frame in ("NED", "ENU"):
+            usual[signal.topic] = signal.frame, f"{signal.frame} is as in the profile {like.name if like else ''}"
+    return [
+        replace(one, usual_frame=usual[one.topic][0], usual_by=usual[one.topic][1]) if one.topic in usual else one
+        for one in groups
+    ]
 
 
 def _other(topics: Sequence[Topic], groups: Sequence[FieldGroup]) -> str:

@@ -613,3 +613,47 @@ def test_a_guessed_order_that_never_changes_is_left_out(tmp_path: Path) -> None:
 def test_columns_among_which_no_actuator_is_found_are_named(tmp_path: Path) -> None:
     with pytest.raises(FerryIdError, match=r"beside pose and velocity the columns left_knob, right_knob\. Fix"):
         drafted(tmp_path, two_thrusters("left_knob", "right_knob"))
+
+
+def odometry_and_receiver(folder: Path, *, mirrored: bool) -> Path:
+    """Write a folder of an odometry, in ENU and FLU or in NED and FRD, a receiver of half its rate, and an order."""
+    c = sailed()
+    # Measured: positions that are the velocities' sum to the last digit would be reckoned.
+    c["N"], c["E"] = 1e-3 * np.random.default_rng(5).standard_normal((2, c["t"].size)) + [c["N"], c["E"]]
+    latitude, longitude = 63.4 + c["N"] / 111_400.0, 10.4 + c["E"] / (111_400.0 * np.cos(np.radians(63.4)))
+    pose = (
+        (c["E"], c["N"], 0.5 * np.pi - c["psi"], c["u"], -c["v"])
+        if mirrored
+        else [c[k] for k in ("N", "E", "psi", "u", "v")]
+    )
+    for name, header, columns in (
+        ("odom", "t,x,y,yaw,u,v", (c["t"], *pose)),
+        ("fix", "t,latitude,longitude", (c["t"][::2], latitude[::2], longitude[::2])),
+        ("thruster", "t,rpm", (c["t"], c["n"])),
+    ):
+        np.savetxt(folder / f"{name}.csv", np.column_stack(columns), "%.10g", ",", header=header, comments="")
+    return folder
+
+
+@pytest.mark.parametrize("mirrored", [True, False])
+def test_a_geodetic_position_tells_a_chart_from_its_mirror_image(tmp_path: Path, mirrored: bool) -> None:
+    draft = draft_profile(odometry_and_receiver(tmp_path, mirrored=mirrored))
+    found = {signal.quantity: signal for signal in draft.every}
+    assert found["position"].topic == "/odom"
+    frames = ("ENU", "ENU", "FLU") if mirrored else ("NED", "NED", "FRD")
+    assert tuple(found[name].frame for name in ("position", "heading", "velocity")) == frames
+    assert any("/fix: latitude, longitude" in one for one in found["position"].evidence)
+    assert not any("mirror image" in one for one in (*found["position"].doubts, *found["heading"].doubts))
+
+
+def test_an_odometry_that_nothing_tells_from_its_mirror_image_is_in_the_frames_of_its_message() -> None:
+    found = {signal.quantity: signal for signal in draft_profile(FIXTURES / "short.mcap").every}
+    frames = [found[name].frame for name in ("position", "heading", "velocity", "yaw_rate")]
+    assert frames == ["ENU", "ENU", "FLU", "FLU"]
+    for name in ("position", "heading"):
+        assert any("mirror image" in one and "REP 103" in one for one in found[name].doubts)
+    found = {
+        signal.quantity: signal for signal in draft_profile(FIXTURES / "short.mcap", load_profile("milliampere")).every
+    }
+    assert [found[name].frame for name in ("position", "heading", "velocity")] == ["NED", "NED", "FRD"]
+    assert any("mirror image" in one and "milliampere" in one for one in found["heading"].doubts)
