@@ -20,7 +20,7 @@ _ANGLE = frozenset({"azimuth", "azi", "angle", "alpha", "direction", "steering",
 _RUDDER = frozenset({"rudder", "delta"})
 _FORCE = frozenset({"force", "thrust", "newton", "thruster"})
 _DUTY = frozenset({"pwm", "throttle", "duty", "percent"})
-_BASES = (
+BASES = (
     "thruster",
     "propeller",
     "prop",
@@ -34,7 +34,7 @@ _BASES = (
     "esc",
     "rudder",
 )
-_SIDES = (
+SIDES = (
     "stern",
     "aft",
     "bow",
@@ -49,13 +49,16 @@ _SIDES = (
     "centre",
     "mid",
 )
+_SHORT_SIDES = {"stbd": "starboard", "stb": "starboard", "sb": "starboard"}
+_LETTERS = {"p": ("s", "port"), "s": ("p", "starboard"), "l": ("r", "left"), "r": ("l", "right")}
+"""Letters of sides: each with that of the other side, and what it means."""
 _BUS = frozenset({"motors", "lli", "can", "bus", "serial", "servo", "servos", "actuation"})
 _SELECTORS = ("id", "channel", "index", "node", "number")
 _VALUES = ("data", "value", "val", "setpoint", "pwm", "command", "cmd")
 _MOST_SHARED = 16
 """Actuators on one topic."""
 _FEEDBACK = frozenset({"state", "feedback", "actual", "measured", "encoder", "status"})
-_UNRELATED = frozenset(
+UNRELATED = frozenset(
     [
         "desired",
         "error",
@@ -92,9 +95,11 @@ _UNRELATED = frozenset(
         "camera",
     ]
 )
-_MARKS = frozenset(
-    {*_BASES, *_SIDES, *_RUDDER, "rpm", "azi", "thrust", "pwm", "lpwm", "rpwm", "thrusters", "actuators"}
+_MARKS = frozenset({*BASES, *SIDES, *_RUDDER, "rpm", "azi", "thrust", "pwm", "lpwm", "rpwm", "thrusters", "actuators"})
+_SAME = frozenset(
+    {"raw", "filtered", "filt", "smooth", "smoothed", "mean", "average", "avg", "min", "max", "data", "value"}
 )
+"""Words by which two fields of one actuator differ."""
 
 
 @dataclass(frozen=True)
@@ -117,6 +122,8 @@ class ActuatorField:
         Fields and values of the messages that are its own, on a topic that carries several actuators.
     setting
         What the parameters of an autopilot state of it; None where they do not.
+    assumed
+        What is assumed of it, as its name does not state it; empty where it does.
     """
 
     actuator: str
@@ -127,6 +134,7 @@ class ActuatorField:
     rate_hz: float
     where: tuple[tuple[str, float], ...] = ()
     setting: OutputSetting | None = None
+    assumed: str = ""
 
     @property
     def stream(self) -> str:
@@ -141,20 +149,21 @@ class ActuatorField:
 
 def actuator_fields(topics: Sequence[Topic]) -> list[ActuatorField]:
     """Return the fields of actuators in the order of the log, each with the actuator that it belongs to."""
-    found = []
+    found: list[ActuatorField] = []
+    paired = paired_names(topics)
     for topic in topics:
-        around = () if topic.name == "table" else _split(words_of(topic.name))
-        if topic.count < 2 or set(around) & (_UNRELATED | {"odometry", "navigation"}):
+        around = () if topic.name == "table" else sided(words_of(topic.name), paired)
+        if topic.count < 2 or set(around) & (UNRELATED | {"odometry", "navigation"}):
             continue
         fields = numeric_fields(topic)
         bare = {words[0] for words in fields.values() if len(words) == 1}
         for path, own in fields.items():
-            words = _split(own)
+            words = sided(own, paired)
             every = (*around, *words)
             marked = bool(set(every) & _MARKS) or (
                 topic.encoding == "table" and words == ("n",) and "rudder" in bare and "e" not in bare
             )
-            if not marked or set(words) & _UNRELATED:
+            if not marked or set(words) & UNRELATED:
                 continue
             role = _role(words, around)
             if role:
@@ -165,7 +174,70 @@ def actuator_fields(topics: Sequence[Topic]) -> list[ActuatorField]:
     if names == {"azimuth", "propeller"}:
         # One speed and one angle without a number: one thruster.
         found = [replace(one, actuator="azimuth") for one in found]
-    return found
+    return _apart(found, paired)
+
+
+def paired_names(topics: Sequence[Topic]) -> frozenset[tuple[str, ...]]:
+    """Return the names of topics and fields, as words, that another has but for a letter of the other side."""
+    names = {words_of(topic.name) for topic in topics} | {
+        words for topic in topics for words in numeric_fields(topic).values()
+    }
+    return frozenset(
+        words
+        for words in names
+        for k, word in enumerate(words)
+        if word in _LETTERS and (*words[:k], _LETTERS[word][0], *words[k + 1 :]) in names
+    )
+
+
+def sided(words: tuple[str, ...], paired: frozenset[tuple[str, ...]]) -> tuple[str, ...]:
+    """Return words with their sides written out: a letter is one beside a word of an actuator, where its pair is there too.
+
+    A lone p or r is a roll rate or a yaw rate, and delta_r a rudder angle.
+    """
+    parted = _split(words)
+    letters = words in paired and bool({*parted} & (_MARKS | {"n"}))
+    return tuple(_LETTERS[word][1] if letters and word in _LETTERS else _SHORT_SIDES.get(word, word) for word in parted)
+
+
+def _apart(fields: Sequence[ActuatorField], paired: frozenset[tuple[str, ...]]) -> list[ActuatorField]:
+    """Return fields, those that would be the same signal of one actuator named after the words by which they differ.
+
+    Where the actuator has other signals, its first field keeps the name. Fields that differ by words as raw and filtered
+    are those of one actuator.
+    """
+    alike: dict[tuple[str, str, bool], list[ActuatorField]] = {}
+    for one in fields:
+        alike.setdefault((one.actuator, one.role, one.order is True), []).append(one)
+    roles = {one.actuator: {other.role for other in fields if other.actuator == one.actuator} for one in fields}
+    names: dict[str, str] = {}
+    for (actuator, _, _), group in alike.items():
+        rests = [_rest(one, paired) for one in group]
+        first = len(group) > 1 and len(roles[actuator]) > 1
+        for one, rest in zip(group[first:], rests[first:], strict=True):
+            if rest and len(set(rests)) > 1:
+                names[one.label] = "_".join((actuator, *rest))
+    return [replace(one, actuator=names.get(one.label, one.actuator)) for one in fields]
+
+
+def _rest(field: ActuatorField, paired: frozenset[tuple[str, ...]]) -> tuple[str, ...]:
+    """Return the words of a field's name that say neither its actuator nor what it is."""
+    said = {
+        *_SPEED,
+        *_ANGLE,
+        *_RUDDER,
+        *_FORCE,
+        *_DUTY,
+        *BASES,
+        *_FEEDBACK,
+        *_SAME,
+        *ORDERS,
+        *field.actuator.split("_"),
+    }
+    around = () if field.topic == "table" else sided(words_of(field.topic), paired)
+    every = (*around, *sided(words_of(field.path), paired))
+    # The number of an actuator stands behind its name.
+    return tuple(word for word in dict.fromkeys(every) if word not in said and not field.actuator.endswith(word))
 
 
 @dataclass(frozen=True)
@@ -259,9 +331,9 @@ def _order(words: Sequence[str], role: str) -> bool | None:
 
 def _name(words: Sequence[str], role: str) -> str:
     """Return the name of an actuator: side and number, or what it is where there is but one."""
-    sides = [word for word in dict.fromkeys(words) if word in _SIDES]
+    sides = [word for word in dict.fromkeys(words) if word in SIDES]
     number = next((word for word in words if word.isdigit()), "")
-    base = next((word for word in words if word in _BASES), "")
+    base = next((word for word in words if word in BASES), "")
     base = {"prop": "propeller", "azi": "azimuth"}.get(base, base)
     if sides:
         return "_".join(sides) + number

@@ -10,6 +10,7 @@ import numpy as np
 
 from ferryid.draft.actuator_fields import ActuatorField
 from ferryid.draft.autopilot_parameters import NOT_STATED, OutputSetting, Placement
+from ferryid.draft.guessed_orders import WHETHER
 from ferryid.draft.mapped import MappedSignal, Motion
 from ferryid.draft.samples import Samples
 from ferryid.draft.thresholds import DRAFT
@@ -138,7 +139,13 @@ def _signal(
     low = float(np.quantile(on, 0.01)) if on.size else 0.0
     unit, why, doubt = _unit(role, field, largest, low)
     stated = field.setting or OutputSetting()
-    shown = "an order, by its name" if order else "feedback, by its name" if field.order is False else ""
+    shown = (
+        "an order, by its name"
+        if order and field.assumed != WHETHER
+        else "feedback, by its name"
+        if field.order is False
+        else ""
+    )
     if measured:
         shown = "feedback, as another field of the actuator is the order"
     evidence = (*filter(None, [shown]), *stated.evidence, why if stated.in_pulses else f"in {unit}: {why}")
@@ -153,6 +160,7 @@ def _signal(
             filter(
                 None,
                 [
+                    field.assumed,
                     doubt,
                     *stated.doubts,
                     "" if field.order is not None or measured else UNKNOWN_ORDER,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -9,7 +10,8 @@ from pathlib import Path
 from ferryid.draft.actuator_fields import actuator_fields, parted, shared_topics
 from ferryid.draft.actuators import UNKNOWN_ORDER, DraftedActuator, drafted_actuators
 from ferryid.draft.autopilots import Orders, autopilot_fields, autopilot_groups, changing, orders, with_frames
-from ferryid.draft.fields import navigation_groups
+from ferryid.draft.fields import FieldGroup, navigation_groups
+from ferryid.draft.guessed_orders import guessed_orders
 from ferryid.draft.kinematics import navigation_signals
 from ferryid.draft.mapped import MappedSignal
 from ferryid.draft.samples import read_samples
@@ -87,19 +89,22 @@ def draft_profile(log: str | Path, like: Profile | None = None, ranges: TimeRang
     topics = reader.topics
     autopilot = autopilot_fields(topics)
     groups = with_frames([*navigation_groups(topics), *autopilot_groups(topics)], topics)
+    groups = _with_usual_frames(groups, topics, like)
     fields, winds = autopilot or actuator_fields(topics), wind_fields(topics)
     if not groups and not fields and any("named by their place" in topic.note for topic in topics):
         raise FerryIdError(
             f"{log}: its columns have no names, so that nothing shows what they are. Fix: add a header row, or give --like a "
             "profile whose [table] has columns"
         )
+    # What names its actuators by numbers is of use only where none has a name.
+    shared = [] if fields else shared_topics(topics)
+    if groups and not shared and not autopilot:
+        fields = [*fields, *guessed_orders(topics, fields)]
     wanted: dict[str, list[str]] = {}
     for group in groups:
         wanted.setdefault(group.topic, []).extend(group.fields)
     for field in fields:
         wanted.setdefault(field.topic, []).append(field.path)
-    # What names its actuators by numbers is of use only where none has a name.
-    shared = [] if fields else shared_topics(topics)
     for bus in shared:
         wanted.setdefault(bus.topic, []).extend((*bus.selectors, bus.value))
     for topic, speed, direction in winds:
@@ -115,7 +120,7 @@ def draft_profile(log: str | Path, like: Profile | None = None, ranges: TimeRang
     samples = read_samples(reader, wanted, str(log), ranges)
     looked_for = fields
     driven = orders(fields, samples, parameters_of(reader)) if autopilot else Orders(tuple(fields))
-    fields = list(driven.fields)
+    fields = [one for one in driven.fields if not one.assumed or changing([one], samples)]
     for bus in shared:
         more, samples = parted(bus, samples)
         fields += more
@@ -131,8 +136,7 @@ def draft_profile(log: str | Path, like: Profile | None = None, ranges: TimeRang
         what = (
             f"nothing that looks like an actuator ever changes, found {_listed(still)}"
             if still
-            else "no field looks like an actuator's speed, angle, force or order, found the topics "
-            f"{_listed([one.name for one in topics])}"
+            else f"no field looks like an actuator's speed, angle, force or order, found {_other(topics, groups)}"
         )
         raise FerryIdError(
             f"{log}: {what}{''.join(f'; {one}' for one in driven.remarks)}. Fix: record "
@@ -189,6 +193,32 @@ def _nothing(topics: Sequence[Topic]) -> str:
 def _fields(topics: Sequence[Topic]) -> list[str]:
     """Return the names of topics, and of the columns where the log is a table."""
     return [path for one in topics for path in ((*one.fields,) if one.name == "table" else (one.name,))]
+
+
+def _with_usual_frames(groups: Sequence[FieldGroup], topics: Sequence[Topic], like: Profile | None) -> list[FieldGroup]:
+    """Return groups with the frame that holds where motion leaves NED and ENU open: of a like profile, or of the message."""
+    usual = {
+        one.name: ("ENU", f"ENU is the convention of {one.type} (REP 103)")
+        for one in topics
+        if re.fullmatch(r"nav_msgs/(msg/)?Odometry", one.type)
+    }
+    for signal in () if like is None else like.signals:
+        if signal.quantity in ("position", "heading") and signal.frame in ("NED", "ENU"):
+            usual[signal.topic] = signal.frame, f"{signal.frame} is as in the profile {like.name if like else ''}"
+    return [
+        replace(one, usual_frame=usual[one.topic][0], usual_by=usual[one.topic][1]) if one.topic in usual else one
+        for one in groups
+    ]
+
+
+def _other(topics: Sequence[Topic], groups: Sequence[FieldGroup]) -> str:
+    """Return the topics, and of a table the columns that are no pose or velocity, for an error."""
+    if all(one.name != "table" for one in topics):
+        return f"the topics {_listed([one.name for one in topics])}"
+    taken = {path for one in groups if one.topic == "table" for path in one.fields}
+    # The columns that a time was guessed from stand in the note of their table.
+    taken |= {path for one in topics for path in one.fields if f'"{path}"' in one.note}
+    return f"beside pose and velocity the columns {_listed([one for one in _fields(topics) if one not in taken])}"
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -150,6 +150,8 @@ class FieldGroup:
         The frame that the log's format states, empty where it states none.
     lasts_s
         From the first message to the last [s].
+    usual_frame, usual_by
+        The frame of the topic where nothing in the log decides, and whose it is; empty for NED.
     """
 
     kind: str
@@ -159,6 +161,8 @@ class FieldGroup:
     rate_hz: float = 0.0
     frame: str = ""
     lasts_s: float = 0.0
+    usual_frame: str = ""
+    usual_by: str = ""
 
     @property
     def named_frame(self) -> str:

@@ -9,13 +9,15 @@ from math import log
 
 import numpy as np
 
+from ferryid.draft.agreement import correlation, explained, usual
+from ferryid.draft.charts import with_geodetic
 from ferryid.draft.fields import FieldGroup
 from ferryid.draft.mapped import MappedSignal, Motion, nearest_unit
 from ferryid.draft.reckoned import reckoned_positions
 from ferryid.draft.samples import Samples, angle_unit, geodetic_unit, metres, yaw
 from ferryid.draft.thresholds import DRAFT
 from ferryid.errors import FerryIdError
-from ferryid.types import Flags, Floats
+from ferryid.types import Floats
 from ferryid.vessel.field_words import unit_of_name, words_of
 from ferryid.vessel.frames import to_body
 from ferryid.vessel.units import KINDS
@@ -42,8 +44,14 @@ class _Pose:
 
     @property
     def usual(self) -> int:
-        """Number of frames that are not NED."""
-        return (self.position_frame == "ENU") + (self.heading_frame == "ENU")
+        """Number of frames that are not the usual ones of their topics."""
+        frames = ((self.position, self.position_frame), (self.heading, self.heading_frame))
+        return sum(one is not None and frame in _WORLD and frame != (one.usual_frame or "NED") for one, frame in frames)
+
+    def usual_body(self, velocity: FieldGroup | None) -> str:
+        """Return the frame of a velocity along the hull that is usual beside this pose."""
+        enu = velocity is not None and velocity.usual_frame == self.heading_frame == "ENU"
+        return "FLU" if enu else "FRD"
 
 
 @dataclass(frozen=True)
@@ -64,6 +72,7 @@ def navigation_signals(groups: Sequence[FieldGroup], samples: Samples) -> tuple[
     reckoned = reckoned_positions(groups, samples)
     if reckoned.left_out:
         groups = [one for one in groups if one not in reckoned.why]
+    groups, placed = with_geodetic(groups, samples, set(reckoned.why))
     chosen = _best(groups, samples)
     unknown = np.full(samples.grid_s.shape, np.nan)
     if chosen is None:
@@ -76,7 +85,8 @@ def navigation_signals(groups: Sequence[FieldGroup], samples: Samples) -> tuple[
     if pose.position is not None:
         mapped = _position(pose, chosen, named)
         doubts = (*reckoned.doubts(pose.position), *mapped.doubts)
-        found.append(replace(mapped, evidence=(*mapped.evidence, *reckoned.evidence()), doubts=doubts))
+        shown = (*mapped.evidence, *placed.get(pose.position.label, ()), *reckoned.evidence())
+        found.append(replace(mapped, evidence=shown, doubts=doubts))
     found.append(_heading(chosen, slope, named, groups, samples))
     if velocity is not None:
         found.append(_velocity(velocity, chosen, _others(groups, chosen, samples)))
@@ -149,7 +159,7 @@ def _along_hull(pose: _Pose, velocity: FieldGroup, samples: Samples) -> float:
     """Return which share of a velocity a pose explains if it is along the hull."""
     first, second = (_smoothed(samples, velocity, place) for place in (0, 1))
     ahead, aside = to_body(pose.north, pose.east, pose.psi)
-    return max(_explained(first, second, ahead, aside)[0], _explained(first, second, ahead, -aside)[0])
+    return max(explained(first, second, ahead, aside)[0], explained(first, second, ahead, -aside)[0])
 
 
 def _preference(one: _Agreement) -> tuple[float, ...]:
@@ -163,7 +173,8 @@ def _preference(one: _Agreement) -> tuple[float, ...]:
     against = sum(bool(stated) and frame != stated for frame in frames)
     apart = sum(pose.position is not None and pose.position.topic != pose.heading.topic for _ in (0,))
     named = -sum("ned" in words_of(group.topic) for group in (pose.position, pose.heading) if group is not None)
-    return against, apart, named, pose.usual, one.frame == "FLU", -one.share
+    other_body = one.frame in _BODY and one.frame != pose.usual_body(one.velocity)
+    return against, apart, named, pose.usual, other_body, -one.share
 
 
 def _named_frame(pose: _Pose) -> str:
@@ -222,15 +233,16 @@ def _agreement(pose: _Pose, velocity: FieldGroup | None, samples: Samples) -> _A
     first, second = (_smoothed(samples, velocity, place) for place in (0, 1))
     ahead, aside = to_body(pose.north, pose.east, pose.psi)
     named = velocity.frame or velocity.named_frame
+    body = pose.usual_body(velocity)
     if pose.position is None:
-        return _Agreement(0.0, named or "FRD", 1.0, 0.0, velocity, pose)
+        return _Agreement(0.0, named or body, 1.0, 0.0, velocity, pose)
     seen = {}
     for frame in (*_BODY, *_WORLD):
         x, y = (ahead, aside) if frame in _BODY else (pose.north, pose.east)
         x, y = {"FLU": (x, -y), "ENU": (y, x)}.get(frame, (x, y))
-        share, gain, sway = _explained(first, second, x, y)
+        share, gain, sway = explained(first, second, x, y)
         seen[frame] = _Agreement(share, frame, gain, sway, velocity, pose)
-    best = seen[named or "FRD"]
+    best = seen[named or body]
     if velocity.frame:
         return best
     for one in seen.values():
@@ -240,48 +252,13 @@ def _agreement(pose: _Pose, velocity: FieldGroup | None, samples: Samples) -> _A
     return best
 
 
-def _explained(first: Floats, second: Floats, x: Floats, y: Floats) -> tuple[float, float, float]:
-    """Return which share of a measured vector another explains, how many times as large it is, and how second parts correlate.
-
-    The vector is a velocity and the other the slope of a position, which is the noisier: how large the velocity is of it comes
-    from the regression of the slope on the velocity, as where a log is checked. The other regression takes noise for size.
-    """
-    rows = np.isfinite(first + second + x + y)
-    rows &= _usual(np.hypot(x, y), rows)
-    if np.count_nonzero(rows) < DRAFT.fewest_rows:
-        return 0.0, 1.0, 0.0
-    both = float(x[rows] @ x[rows] + y[rows] @ y[rows])
-    gain = float(first[rows] @ x[rows] + second[rows] @ y[rows]) / both if both > 0.0 else 0.0
-    if gain <= 0.0:
-        return 0.0, 1.0, 0.0
-    error = np.hypot(first - x * gain, second - y * gain)
-    rows &= error <= np.quantile(error[rows], 0.95)
-    total = float(np.sum(first[rows] ** 2 + second[rows] ** 2))
-    share = 1.0 - float(np.sum(error[rows] ** 2)) / total if total > 0.0 else 0.0
-    both = float(first[rows] @ x[rows] + second[rows] @ y[rows])
-    return share, total / both if both > 0.0 else gain, _correlation(second[rows], y[rows])
-
-
-def _usual(size: Floats, rows: Flags) -> Flags:
-    """True where a speed is not that of a jump of the position."""
-    usual = float(np.quantile(size[rows], 0.9)) if rows.any() else np.inf
-    return np.asarray(size <= DRAFT.jump * max(usual, 1e-9))
-
-
-def _correlation(a: Floats, b: Floats) -> float:
-    rows = np.isfinite(a + b)
-    if np.count_nonzero(rows) < DRAFT.fewest_rows or np.ptp(a[rows]) == 0.0 or np.ptp(b[rows]) == 0.0:
-        return 0.0
-    return float(np.corrcoef(a[rows], b[rows])[0, 1])
-
-
 def _along(pose: _Pose) -> float:
     """Return how nearly the vessel moves along its heading: 1 always, 0 in all directions alike."""
     speed = np.hypot(pose.north, pose.east)
     rows = np.isfinite(speed + pose.psi)
     if not rows.any():
         return 0.0
-    rows &= _usual(speed, rows)
+    rows &= usual(speed, rows)
     rows &= speed > DRAFT.moving * float(np.quantile(speed[rows], 0.95)) if rows.any() else rows
     if np.count_nonzero(rows) < DRAFT.fewest_rows:
         return 0.0
@@ -321,9 +298,11 @@ def _mirror(pose: _Pose, named: str) -> tuple[str, ...]:
     """Return that motion alone does not tell a chart from its mirror image, unless a name or a geodetic position does."""
     if named or (pose.position is not None and pose.position.form == "geodetic"):
         return ()
-    return (
-        "motion alone does not distinguish NED from its mirror image ENU: in a turn to starboard the heading has to rise",
-    )
+    told = "motion alone does not distinguish NED from its mirror image ENU"
+    if pose.heading.usual_by and pose.heading_frame == pose.heading.usual_frame:
+        way = "rise" if pose.heading_frame == "NED" else "fall"
+        return (f"{told}: {pose.heading.usual_by}; in a turn to starboard the heading as recorded has to {way}",)
+    return (f"{told}: in a turn to starboard the heading has to rise",)
 
 
 def _heading(
@@ -392,7 +371,7 @@ def _alike(a: Sequence[Floats], b: Sequence[Floats]) -> bool:
     """Tell whether two velocities are the same but for their unit and frame."""
     x, y = b
     turned = ((x, y), (x, -y), (y, x), (-x, -y))
-    return any(_explained(a[0], a[1], one, other)[0] >= DRAFT.agrees for one, other in turned)
+    return any(explained(a[0], a[1], one, other)[0] >= DRAFT.agrees for one, other in turned)
 
 
 def _velocity(velocity: FieldGroup, chosen: _Agreement, others: Sequence[str]) -> MappedSignal:
@@ -420,7 +399,8 @@ def _velocity(velocity: FieldGroup, chosen: _Agreement, others: Sequence[str]) -
         doubts.append(f"it is {left:.2f} times the position's slope, which no unit explains")
     if chosen.frame in _BODY and abs(chosen.sway) < DRAFT.seen:
         doubts.append(
-            f"sway is too small to show its sign (correlation {chosen.sway:.2f}): positive to starboard is assumed"
+            f"sway is too small to show its sign (correlation {chosen.sway:.2f}): positive to "
+            f"{'port' if chosen.frame == 'FLU' else 'starboard'} is assumed"
         )
     elif chosen.frame in _BODY:
         evidence += f"; sway with a correlation of {chosen.sway:.2f}"
@@ -442,7 +422,7 @@ def _yaw_rate(
         if np.count_nonzero(rows) < DRAFT.fewest_rows:
             continue
         rows &= np.abs(slope) <= DRAFT.jump * max(float(np.quantile(np.abs(slope[rows]), 0.9)), 1e-9)
-        seen = _correlation(rate[rows], slope[rows])
+        seen = correlation(rate[rows], slope[rows])
         power = float(slope[rows] @ slope[rows])
         gain = float(rate[rows] @ slope[rows]) / power if power > 0.0 else 0.0
         same = group.topic == heading.topic

@@ -510,3 +510,150 @@ def test_a_velocity_along_the_axes_of_the_position_leaves_open_which_is_the_head
     for rate_of, slope_of in (("col3", "col0"), ("col4", "col1"), ("col5", "col2")):
         assert f"{rate_of} follows the slope of {slope_of}" in str(refused.value)
     assert "turned by" not in str(refused.value)
+
+
+def two_thrusters(first: str, second: str) -> Columns:
+    """Return a trial whose speed stands in two columns of these names."""
+    c = sailed(60.0)
+    return {"t": c["t"], "N": c["N"], "E": c["E"], "psi": c["psi"], "r": c["r"], first: c["n"] + 9.0 * c["rudder"],
+            second: c["n"] - 9.0 * c["rudder"]}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("columns", "names"),
+    [
+        (("n_port", "n_stb"), ["port", "starboard"]),
+        (("n_p", "n_s"), ["port", "starboard"]),
+        (("thruster_p", "thruster_s"), ["port", "starboard"]),
+        (("PWM port", "PWM stbd"), ["port", "starboard"]),
+        (("thrust_sb", "thrust_port"), ["starboard", "port"]),
+        (("rpm_l", "rpm_r"), ["left", "right"]),
+        (("rpm_main", "rpm_auxiliary"), ["propeller_main", "propeller_auxiliary"]),
+        # Once filtered and once as measured it is one propeller.
+        (("rpm", "rpm_filtered"), ["propeller"]),
+    ],
+)
+def test_two_thrusters_are_two_actuators(tmp_path: Path, columns: tuple[str, str], names: list[str]) -> None:
+    draft, found = drafted(tmp_path, two_thrusters(*columns))
+    assert [one.name for one in draft.actuators] == names
+    assert found["yaw_rate"].fields == ("r",)
+
+
+def test_of_two_propellers_with_one_rudder_the_first_keeps_it(tmp_path: Path) -> None:
+    columns = two_thrusters("rpm_main", "rpm_auxiliary") | {"rudder": sailed(60.0)["rudder"]}
+    _, found = drafted(tmp_path, columns)
+    assert {one for one in found if "." in one} == {"propeller.speed", "propeller.rudder", "propeller_auxiliary.speed"}
+
+
+def test_a_letter_is_a_side_only_beside_its_other_side(tmp_path: Path) -> None:
+    draft, _ = drafted(tmp_path, {**in_ned(sailed()), "delta_r": sailed()["rudder"]})
+    assert [one.name for one in draft.actuators] == ["propeller"]
+
+
+@pytest.mark.parametrize(
+    ("columns", "names"),
+    [
+        (("cmd_port", "cmd_stbd"), ["port", "starboard"]),
+        (("thr_left", "thr_right"), ["left", "right"]),
+        (("left_thr", "right_thr"), ["left", "right"]),
+        (("motor_l", "motor_r"), ["left", "right"]),
+        (("servo1_raw", "servo3_raw"), ["output1", "output3"]),
+        (("T1", "T2"), ["actuator1", "actuator2"]),
+        (("u1", "u2"), ["actuator1", "actuator2"]),
+        (("RCOU.C1", "RCOU.C3"), ["output1", "output3"]),
+    ],
+)
+def test_what_may_be_an_order_to_a_thruster_is_drafted_as_one_to_be_checked(
+    tmp_path: Path, columns: tuple[str, str], names: list[str]
+) -> None:
+    draft, found = drafted(tmp_path, two_thrusters(*columns))
+    assert [one.name for one in draft.actuators] == names
+    orders = [found[f"{name}.speed.command"] for name in names]
+    assert all("a share of full power is assumed" in one.doubts[0] for one in orders)
+    assert found["yaw_rate"].fields == ("r",)
+
+
+@pytest.mark.parametrize("topic", ["thrusters/{}/cmd", "heron/thrusters/{}/input", "motor/{}", "{}/cmd"])
+def test_a_topic_of_side_and_order_is_an_order_to_be_checked(tmp_path: Path, topic: str) -> None:
+    c = sailed(60.0)
+    np.savetxt(tmp_path / "nav.csv", np.column_stack([c[name] for name in ("t", "N", "E", "psi", "r")]), "%.6g", ",",
+               header="t,N,E,psi,r", comments="")  # fmt: skip
+    for side, share in (("port", c["n"] / 1000.0), ("starboard", c["n"] / 1100.0)):
+        place = tmp_path / f"{topic.format(side)}.csv"
+        place.parent.mkdir(parents=True, exist_ok=True)
+        np.savetxt(place, np.column_stack([c["t"], share]), "%.6g", ",", header="t,data", comments="")
+    draft = draft_profile(tmp_path)
+    assert [one.name for one in draft.actuators] == ["port", "starboard"]
+    assert all("a share of full power is assumed" in one.signals[0].doubts[0] for one in draft.actuators)
+
+
+@pytest.mark.parametrize(
+    ("more", "kept"),
+    [
+        # A temperature, a current, a network port, and one number alone.
+        (("motor_l [degC]", "motor_r [degC]"), 1),
+        (("motor_current_l", "motor_current_r"), 1),
+        (("cmd_port", "cmd_vel"), 1),
+        (("T1", "T2"), 1),
+    ],
+)
+def test_beside_a_thruster_with_a_name_nothing_is_guessed(tmp_path: Path, more: tuple[str, str], kept: int) -> None:
+    columns = two_thrusters(*more) | {"rpm": sailed(60.0)["n"]}
+    draft, _ = drafted(tmp_path, columns)
+    assert len(draft.actuators) == kept
+
+
+def test_a_guessed_order_that_never_changes_is_left_out(tmp_path: Path) -> None:
+    columns = two_thrusters("servo1_raw", "servo3_raw")
+    columns |= {"servo2_raw": np.full(columns["t"].size, 1500.0)}
+    draft, _ = drafted(tmp_path, columns)
+    assert [one.name for one in draft.actuators] == ["output1", "output3"]
+
+
+def test_columns_among_which_no_actuator_is_found_are_named(tmp_path: Path) -> None:
+    with pytest.raises(FerryIdError, match=r"beside pose and velocity the columns left_knob, right_knob\. Fix"):
+        drafted(tmp_path, two_thrusters("left_knob", "right_knob"))
+
+
+def odometry_and_receiver(folder: Path, *, mirrored: bool) -> Path:
+    """Write a folder of an odometry, in ENU and FLU or in NED and FRD, a receiver of half its rate, and an order."""
+    c = sailed()
+    # Measured: positions that are the velocities' sum to the last digit would be reckoned.
+    c["N"], c["E"] = 1e-3 * np.random.default_rng(5).standard_normal((2, c["t"].size)) + [c["N"], c["E"]]
+    latitude, longitude = 63.4 + c["N"] / 111_400.0, 10.4 + c["E"] / (111_400.0 * np.cos(np.radians(63.4)))
+    pose = (
+        (c["E"], c["N"], 0.5 * np.pi - c["psi"], c["u"], -c["v"])
+        if mirrored
+        else [c[k] for k in ("N", "E", "psi", "u", "v")]
+    )
+    for name, header, columns in (
+        ("odom", "t,x,y,yaw,u,v", (c["t"], *pose)),
+        ("fix", "t,latitude,longitude", (c["t"][::2], latitude[::2], longitude[::2])),
+        ("thruster", "t,rpm", (c["t"], c["n"])),
+    ):
+        np.savetxt(folder / f"{name}.csv", np.column_stack(columns), "%.10g", ",", header=header, comments="")
+    return folder
+
+
+@pytest.mark.parametrize("mirrored", [True, False])
+def test_a_geodetic_position_tells_a_chart_from_its_mirror_image(tmp_path: Path, mirrored: bool) -> None:
+    draft = draft_profile(odometry_and_receiver(tmp_path, mirrored=mirrored))
+    found = {signal.quantity: signal for signal in draft.every}
+    assert found["position"].topic == "/odom"
+    frames = ("ENU", "ENU", "FLU") if mirrored else ("NED", "NED", "FRD")
+    assert tuple(found[name].frame for name in ("position", "heading", "velocity")) == frames
+    assert any("/fix: latitude, longitude" in one for one in found["position"].evidence)
+    assert not any("mirror image" in one for one in (*found["position"].doubts, *found["heading"].doubts))
+
+
+def test_an_odometry_that_nothing_tells_from_its_mirror_image_is_in_the_frames_of_its_message() -> None:
+    found = {signal.quantity: signal for signal in draft_profile(FIXTURES / "short.mcap").every}
+    frames = [found[name].frame for name in ("position", "heading", "velocity", "yaw_rate")]
+    assert frames == ["ENU", "ENU", "FLU", "FLU"]
+    for name in ("position", "heading"):
+        assert any("mirror image" in one and "REP 103" in one for one in found[name].doubts)
+    found = {
+        signal.quantity: signal for signal in draft_profile(FIXTURES / "short.mcap", load_profile("milliampere")).every
+    }
+    assert [found[name].frame for name in ("position", "heading", "velocity")] == ["NED", "NED", "FRD"]
+    assert any("mirror image" in one and "milliampere" in one for one in found["heading"].doubts)
