@@ -19,12 +19,14 @@ from ferryid.draft.unnamed import shown_by_values
 from ferryid.draft.wind import wind_fields, wind_signal
 from ferryid.errors import FerryIdError
 from ferryid.ingest import open_log
-from ferryid.ingest.log import Topic
+from ferryid.ingest.log import Reader, Topic
 from ferryid.ingest.parameters import parameters_of
 from ferryid.signals.artificial import simulator
 from ferryid.types import TimeRanges
 from ferryid.vessel.field_words import words_of
 from ferryid.vessel.profile import Profile
+
+FRAME_ID = "header.frame_id"
 
 
 @dataclass(frozen=True)
@@ -89,7 +91,7 @@ def draft_profile(log: str | Path, like: Profile | None = None, ranges: TimeRang
     topics = reader.topics
     autopilot = autopilot_fields(topics)
     groups = with_frames([*navigation_groups(topics), *autopilot_groups(topics)], topics)
-    groups = _with_usual_frames(groups, topics, like)
+    groups = _with_usual_frames(groups, reader, like)
     fields, winds = autopilot or actuator_fields(topics), wind_fields(topics)
     if not groups and not fields and any("named by their place" in topic.note for topic in topics):
         raise FerryIdError(
@@ -195,13 +197,18 @@ def _fields(topics: Sequence[Topic]) -> list[str]:
     return [path for one in topics for path in ((*one.fields,) if one.name == "table" else (one.name,))]
 
 
-def _with_usual_frames(groups: Sequence[FieldGroup], topics: Sequence[Topic], like: Profile | None) -> list[FieldGroup]:
-    """Return groups with the frame that holds where motion leaves NED and ENU open: of a like profile, or of the message."""
-    usual = {
-        one.name: ("ENU", f"ENU is the convention of {one.type} (REP 103)")
-        for one in topics
-        if re.fullmatch(r"nav_msgs/(msg/)?Odometry", one.type)
-    }
+def _with_usual_frames(groups: Sequence[FieldGroup], reader: Reader, like: Profile | None) -> list[FieldGroup]:
+    """Return groups with the frame that holds where motion leaves NED and ENU open.
+
+    That of a like profile, else what the messages state, else the convention of their type.
+    """
+    posed = {one.topic for one in groups if one.kind in ("position", "heading")}
+    usual = {}
+    for topic in (one for one in reader.topics if one.name in posed):
+        if re.fullmatch(r"nav_msgs/(msg/)?Odometry", topic.type):
+            usual[topic.name] = "ENU", f"ENU is the convention of {topic.type} (REP 103)"
+        if stated := _stated_frame(reader, topic):
+            usual[topic.name] = stated
     for signal in () if like is None else like.signals:
         if signal.quantity in ("position", "heading") and signal.frame in ("NED", "ENU"):
             usual[signal.topic] = signal.frame, f"{signal.frame} is as in the profile {like.name if like else ''}"
@@ -209,6 +216,22 @@ def _with_usual_frames(groups: Sequence[FieldGroup], topics: Sequence[Topic], li
         replace(one, usual_frame=usual[one.topic][0], usual_by=usual[one.topic][1]) if one.topic in usual else one
         for one in groups
     ]
+
+
+def _stated_frame(reader: Reader, topic: Topic) -> tuple[str, str] | None:
+    """Return the frame that the headers of a topic name, and the words for it; None where they name none, or several."""
+    if topic.fields.get(FRAME_ID) != "string":
+        return None
+    try:
+        named = set(reader.read({topic.name: [FRAME_ID]})[topic.name].columns[FRAME_ID].tolist())
+    except FerryIdError:
+        # What cannot be read names nothing.
+        return None
+    frames = {frame for one in named for frame in ("NED", "ENU") if frame.lower() in words_of(str(one))}
+    if len(frames) != 1:
+        return None
+    (frame,) = frames
+    return frame, f"{frame} is what {FRAME_ID} of its messages says"
 
 
 def _other(topics: Sequence[Topic], groups: Sequence[FieldGroup]) -> str:

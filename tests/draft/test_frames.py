@@ -1,0 +1,85 @@
+"""In which frame a position in metres is: as another position, the messages or their type say."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from ferryid.draft import draft as drafting
+from ferryid.draft import draft_profile
+from ferryid.draft.draft import _stated_frame
+from ferryid.ingest.log import Topic
+from ferryid.vessel import load_profile
+from tests.draft.test_draft import FIXTURES, sailed
+
+
+def odometry_and_receiver(folder: Path, *, mirrored: bool) -> Path:
+    """Write a folder of an odometry, in ENU and FLU or in NED and FRD, a receiver of half its rate, and an order."""
+    c = sailed()
+    # Measured: positions that are the velocities' sum to the last digit would be reckoned.
+    c["N"], c["E"] = 1e-3 * np.random.default_rng(5).standard_normal((2, c["t"].size)) + [c["N"], c["E"]]
+    latitude, longitude = 63.4 + c["N"] / 111_400.0, 10.4 + c["E"] / (111_400.0 * np.cos(np.radians(63.4)))
+    pose = (
+        (c["E"], c["N"], 0.5 * np.pi - c["psi"], c["u"], -c["v"])
+        if mirrored
+        else [c[k] for k in ("N", "E", "psi", "u", "v")]
+    )
+    for name, header, columns in (
+        ("odom", "t,x,y,yaw,u,v", (c["t"], *pose)),
+        ("fix", "t,latitude,longitude", (c["t"][::2], latitude[::2], longitude[::2])),
+        ("thruster", "t,rpm", (c["t"], c["n"])),
+    ):
+        np.savetxt(folder / f"{name}.csv", np.column_stack(columns), "%.10g", ",", header=header, comments="")
+    return folder
+
+
+@pytest.mark.parametrize("mirrored", [True, False])
+def test_a_geodetic_position_tells_a_chart_from_its_mirror_image(tmp_path: Path, mirrored: bool) -> None:
+    draft = draft_profile(odometry_and_receiver(tmp_path, mirrored=mirrored))
+    found = {signal.quantity: signal for signal in draft.every}
+    assert found["position"].topic == "/odom"
+    frames = ("ENU", "ENU", "FLU") if mirrored else ("NED", "NED", "FRD")
+    assert tuple(found[name].frame for name in ("position", "heading", "velocity")) == frames
+    assert any("/fix: latitude, longitude" in one for one in found["position"].evidence)
+    assert not any("mirror image" in one for one in (*found["position"].doubts, *found["heading"].doubts))
+
+
+def test_the_messages_may_say_in_which_frame_they_are() -> None:
+    """Simulated logs are in NED and FRD, as their headers say."""
+    found = {signal.quantity: signal for signal in draft_profile(FIXTURES / "short.mcap").every}
+    assert [found[name].frame for name in ("position", "heading", "velocity")] == ["NED", "NED", "FRD"]
+    assert any("mirror image" in one and "header.frame_id" in one for one in found["heading"].doubts)
+
+
+@pytest.mark.parametrize(
+    ("names", "frame"),
+    [(["local_enu"], "ENU"), (["map"], None), (["ned", "enu"], None), (["ned", "map"], "NED"), ([], None)],
+)
+def test_a_frame_is_stated_by_one_name(names: list[str], frame: str | None) -> None:
+    topic = Topic("/odom", "nav_msgs/msg/Odometry", "cdr", 9, None, None, {"header.frame_id": "string"})
+    series = SimpleNamespace(columns={"header.frame_id": np.array(names, dtype=object)})
+    reader = cast(Any, SimpleNamespace(read=lambda wanted: dict.fromkeys(wanted, series)))
+    stated = _stated_frame(reader, topic)
+    assert (None if stated is None else stated[0]) == frame
+    assert _stated_frame(reader, replace(topic, fields={"header.frame_id": "float64"})) is None
+
+
+def test_an_odometry_that_nothing_tells_from_its_mirror_image_is_in_the_frames_of_its_message(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(drafting, "_stated_frame", lambda reader, topic: None)
+    found = {signal.quantity: signal for signal in draft_profile(FIXTURES / "short.mcap").every}
+    frames = [found[name].frame for name in ("position", "heading", "velocity", "yaw_rate")]
+    assert frames == ["ENU", "ENU", "FLU", "FLU"]
+    for name in ("position", "heading"):
+        assert any("mirror image" in one and "REP 103" in one for one in found[name].doubts)
+    found = {
+        signal.quantity: signal for signal in draft_profile(FIXTURES / "short.mcap", load_profile("milliampere")).every
+    }
+    assert [found[name].frame for name in ("position", "heading", "velocity")] == ["NED", "NED", "FRD"]
+    assert any("mirror image" in one and "milliampere" in one for one in found["heading"].doubts)
