@@ -9,10 +9,12 @@ from pathlib import Path
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 from ferryid.ingest.log import Loss, TableLayout, Topic
-from ferryid.ingest.mat_tables import MatTable, from_datenum, tables_of
+from ferryid.ingest.mat_tables import MatTable, Untimed, from_datenum, tables_of
 from ferryid.ingest.mat_variables import MatVariables, read_variables
 from ferryid.ingest.table_time import TimePlan
 from ferryid.ingest.tables import Rows, TableReader, to_ns
+
+_SHOWN_NAMES = 6
 
 
 @dataclass(frozen=True)
@@ -34,10 +36,11 @@ class MatSheet:
 
 def open_mat(path: Path, layout: TableLayout | None) -> TableReader:
     variables = read_variables(path)
-    tables = tables_of(variables.found, layout)
+    tables, untimed = tables_of(variables.found, layout)
     if not tables:
         raise FerryIdError(f"{path}: {_without(variables, layout)}")
-    return TableReader([_sheet(path, table) for table in tables], [*variables.losses, *_objects(path, variables)])
+    losses = [*variables.losses, *_objects(path, variables), *(_not_read(path, one, layout) for one in untimed)]
+    return TableReader([_sheet(path, table) for table in tables], losses)
 
 
 def _objects(path: Path, variables: MatVariables) -> list[Loss]:
@@ -49,6 +52,21 @@ def _objects(path: Path, variables: MatVariables) -> list[Loss]:
         )
         for name, kind in variables.objects.items()
     ]
+
+
+def _not_read(path: Path, untimed: Untimed, layout: TableLayout | None) -> Loss:
+    """Return the rows of arrays that have no time beside them."""
+    where = f"the structure {untimed.structure}" if untimed.structure else "the file"
+    names = ", ".join(untimed.names[:_SHOWN_NAMES]) + (", ..." if len(untimed.names) > _SHOWN_NAMES else "")
+    wanted = (
+        f'time "{layout.time}", as the profile\'s [table] names it,' if layout is not None and layout.time else "time"
+    )
+    return Loss(
+        str(path),
+        f"{where} has {counted(len(untimed.names), 'array')} of {untimed.rows} rows without a {wanted} of as many rows "
+        f"({names}). Fix: save the time beside them, or leave them out of what is saved if they are no signals",
+        messages=untimed.rows,
+    )
 
 
 def _sheet(path: Path, table: MatTable) -> MatSheet:
@@ -82,7 +100,7 @@ def _without(variables: MatVariables, layout: TableLayout | None) -> str:
         )
     if variables.losses and not variables.found:
         return f"{variables.losses[0].what}. Fix: copy it again, or save it again in MATLAB"
-    shown = ", ".join(list(variables.found)[:6]) or "nothing"
+    shown = ", ".join(list(variables.found)[:_SHOWN_NAMES]) or "nothing"
     if layout is not None and layout.time:
         return (
             f'no array "{layout.time}" with others of its length, as the profile\'s [table] wants for the time, found {shown}. '

@@ -18,6 +18,8 @@ MOST_WIDE = 1000
 """Columns of a matrix beyond which it is an image or a matrix of a model, not a signal."""
 MOST_STRUCTS = 100
 """Structures of an array that are topics of their own."""
+LEAST_SERIES_ROWS = 50
+"""Rows from which an array without a time is taken for a signal that is not read, not for a constant or a lookup table."""
 _DATENUM_LOW, _DATENUM_HIGH, _DATENUM_STEP = 7.0e5, 7.7e5, 5.8e-5
 """Days since year 0 of 1916 to 2108, and a step of 5 s in days, which no time in seconds of that size has."""
 _DATENUM_1970 = 719_529
@@ -71,6 +73,15 @@ class MatTable:
     dates: bool = False
 
 
+@dataclass(frozen=True)
+class Untimed:
+    """Arrays of one structure and one length that have no time beside them, and so belong to no topic."""
+
+    structure: str
+    names: tuple[str, ...]
+    rows: int
+
+
 @dataclass
 class _Found:
     tables: list[MatTable] = field(default_factory=list)
@@ -89,8 +100,10 @@ class _Found:
         self.tables.append(MatTable(free, columns, time, dates))
 
 
-def tables_of(variables: Mapping[str, Node], layout: TableLayout | None) -> list[MatTable]:
+def tables_of(variables: Mapping[str, Node], layout: TableLayout | None) -> tuple[list[MatTable], list[Untimed]]:
     """Return the topics of a file: ``table`` of the variables themselves, and one for each structure with a time of its own.
+
+    Beside them, the arrays as long as a signal that belong to none.
 
     Parameters
     ----------
@@ -101,14 +114,22 @@ def tables_of(variables: Mapping[str, Node], layout: TableLayout | None) -> list
         matrix.
     """
     found = _Found(layout=layout)
-    _gather(dict(variables), "", found)
+    left = _untimed(_gather(dict(variables), "", found))
     if not found.tables:
         for name, leaf in _matrices(variables, ""):
             _matrix(f"/{name.replace('.', '/')}", leaf, found)
     tables = found.tables
     if len(tables) == 1 and tables[0].name.startswith("/") and tables[0].name.count("/") == 1:
-        return [MatTable("table", tables[0].columns, tables[0].time, tables[0].dates)]
-    return tables
+        tables = [MatTable("table", tables[0].columns, tables[0].time, tables[0].dates)]
+    return tables, left
+
+
+def _untimed(left: Mapping[str, MatColumn]) -> list[Untimed]:
+    groups: dict[tuple[str, int], list[str]] = {}
+    for name, column in left.items():
+        if column.leaf.rows >= LEAST_SERIES_ROWS:
+            groups.setdefault((name.rpartition(".")[0], column.leaf.rows), []).append(name)
+    return [Untimed(structure, tuple(names), rows) for (structure, rows), names in groups.items()]
 
 
 def from_datenum(values: Column) -> Column:

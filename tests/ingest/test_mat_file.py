@@ -221,6 +221,21 @@ def test_objects_beside_other_series_are_reported(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.parametrize("rows", [N, 80])
+def test_arrays_without_a_time_are_reported_where_they_are_as_long_as_a_signal(tmp_path: Path, rows: int) -> None:
+    values = np.ones(rows)
+    path = saved(tmp_path, {"a": {"tima_ns": values, "u": values}, "b": {"t": T, "u": U}, "lookup": np.ones(21)})
+    log = open_log(path)
+    assert [topic.name for topic in log.topics] == ["table"]
+    if rows == N:
+        assert not log.losses, "a lookup table of a vessel is no signal"
+        return
+    (loss,) = log.losses
+    assert loss.messages == 80
+    assert "the structure a has 2 arrays of 80 rows without a time of as many rows (a.tima_ns, a.u)" in loss.what
+    assert "Fix: save the time beside them" in loss.what
+
+
 def test_an_object_of_level_5_has_the_name_inside_it() -> None:
     # As SciPy returns what MATLAB's save writes of a timeseries.
     parts = [("s0", "O"), ("s1", "O"), ("s2", "O"), ("arr", "O")]
