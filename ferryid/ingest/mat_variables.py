@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import struct
 import warnings
 import zlib
@@ -21,11 +22,15 @@ from ferryid.ingest.mat_tables import MOST_STRUCTS, Leaf, Node
 HDF5 = b"\x89HDF\r\n\x1a\n"
 _HEADER = 128
 _MATRIX, _COMPRESSED = 14, 15
-_CELL, _STRUCTURE, _TEXT, _NUMBERS, _COMPLEX = 1, 2, 4, range(6, 16), 0x800
+_TYPES = (*range(1, 8), 9, 12, 13, _MATRIX, 16, 17, 18)
+"""Types of the parts of a variable: numbers, a matrix of its own, and text."""
+_CELL, _STRUCTURE, _TEXT, _SPARSE, _NUMBERS, _COMPLEX = 1, 2, 4, 5, range(6, 16), 0x800
 """Classes of a variable, and the flag of complex numbers."""
-_LARGE_BYTES = 1 << 30
+_LARGE_BYTES = 1 << 28
 _MOST_TIMES_LARGER = 100
 """A variable of more than `_LARGE_BYTES` that needs this many times the size of its file is not read."""
+_MOST_AXES = 64
+"""Axes of an array, as many as NumPy has."""
 _DEEPEST = 12
 """Structures in structures."""
 _FIGURE = ("hgS_", "hgM_", "hgO_")
@@ -173,16 +178,12 @@ def _held_bytes(variable: bytes, order: str) -> int:
     while len(parts) < wanted:
         if place + 8 > len(variable):
             return int(stated)
-        kind, size = struct.unpack_from(f"{order}II", variable, place)
-        if kind >> 16:
-            parts.append(variable[place + 4 : place + 4 + (kind >> 16)])
-            place += 8
-        else:
-            parts.append(variable[place + 8 : place + 8 + size])
-            place += 8 + size + (-size % 8)
+        _, start, end, place = _part(variable, place, order)
+        parts.append(variable[start:end])
         if len(parts) == 3:
             flags = int.from_bytes(parts[0][:4], "big" if order == ">" else "little")
-            count = int(np.prod(np.frombuffer(parts[1], f"{order}i4"), dtype=float)) if len(parts[1]) % 4 == 0 else 0
+            sizes = np.frombuffer(parts[1], f"{order}i4").tolist() if len(parts[1]) % 4 == 0 else [0]
+            count = math.prod(sizes[:_MOST_AXES])
             own = {_CELL: count, _STRUCTURE: 2, _TEXT: 1}.get(flags & 0xFF, 1 + bool(flags & _COMPLEX))
             if flags & 0xFF not in (_CELL, _STRUCTURE, _TEXT, *_NUMBERS) or not 0 <= own <= MOST_STRUCTS:
                 return int(stated)
@@ -196,9 +197,36 @@ def _held_bytes(variable: bytes, order: str) -> int:
     return min(place - 8, int(stated))
 
 
+def _part(variable: bytes, place: int, order: str) -> tuple[int, int, int, int]:
+    """Return the type of the part that begins at a place, begin and end of its data, and where the next part begins."""
+    kind, size = struct.unpack_from(f"{order}II", variable, place)
+    if kind >> 16:
+        # Up to four bytes are in the tag itself.
+        return kind & 0xFFFF, place + 4, place + 4 + (kind >> 16), place + 8
+    return kind, place + 8, place + 8 + size, place + 8 + size + (-size % 8)
+
+
+def _check_parts(variable: bytes, order: str, begin: int, end: int) -> None:
+    """Refuse a variable with a part that is longer than it, or of a type on which SciPy would crash (segmentation fault)."""
+    place, number, numbers = begin, 0, False
+    while place + 8 <= end:
+        kind, start, stop, following = _part(variable, place, order)
+        if stop > end:
+            raise ValueError(f"its part at byte {place} is longer than it")
+        if kind not in _TYPES or (kind == _MATRIX and numbers):
+            raise ValueError(f"its part at byte {place} has type {kind}, not one of its class")
+        if kind == _MATRIX:
+            _check_parts(variable, order, start, stop)
+        if number == 0:
+            flags = int.from_bytes(variable[start : start + 4], "big" if order == ">" else "little")
+            numbers = flags & 0xFF in (_TEXT, _SPARSE, *_NUMBERS)
+        place, number = following, number + 1
+
+
 def _loaded(variable: bytes, order: str, header: bytes) -> Mapping[str, Any]:
     import scipy.io
 
+    _check_parts(variable, order, 8, len(variable))
     file: Any = io.BytesIO(header + variable)
     with warnings.catch_warnings():
         # Names that are no names in Python, and functions that are not kept.
@@ -308,13 +336,14 @@ def _hdf5(path: Path) -> MatVariables:
     result = MatVariables()
     try:
         with h5py.File(path, "r") as file:
-            for name in file:
+            for key in file:
+                name = _hdf5_name(key)
                 if name.startswith("#"):
                     continue
                 if name.startswith(_FIGURE):
                     result.figure = True
                     continue
-                node = _hdf5_node(path, file, file[name], name, result, 0)
+                node = _hdf5_node(path, file, file[key], name, result, 0)
                 if node is not None:
                     result.found[name] = node
     except Exception as error:
@@ -322,6 +351,11 @@ def _hdf5(path: Path) -> MatVariables:
             f"{path}: the MAT file cannot be read ({_reason(error)}). Fix: copy it again, or save it again in MATLAB"
         ) from error
     return result
+
+
+def _hdf5_name(key: str | bytes) -> str:
+    """Return a name as text; h5py returns one that is no UTF-8, which MATLAB does not write, as bytes."""
+    return key if isinstance(key, str) else key.decode("utf-8", "backslashreplace")
 
 
 def _hdf5_node(path: Path, file: Any, item: Any, name: str, result: MatVariables, depth: int) -> Node | None:
@@ -335,8 +369,11 @@ def _hdf5_node(path: Path, file: Any, item: Any, name: str, result: MatVariables
         result.objects[name] = kind
         return None
     if isinstance(item, h5py.Group):
-        inner = {key: _hdf5_node(path, file, item[key], f"{name}.{key}", result, depth + 1) for key in item}
-        return _as_columns({key: node for key, node in inner.items() if node is not None})
+        keys = {_hdf5_name(key): key for key in item}
+        inner = {
+            one: _hdf5_node(path, file, item[key], f"{name}.{one}", result, depth + 1) for one, key in keys.items()
+        }
+        return _as_columns({one: node for one, node in inner.items() if node is not None})
     if "MATLAB_empty" in item.attrs or not isinstance(item, h5py.Dataset):
         return None
     if item.dtype.kind == "O":

@@ -51,6 +51,8 @@ class Base:
         What its checksums promise.
     spans
         File to stretches of bytes that checksums cover; None where they cover everything.
+    whole_at
+        Sizes [bytes] at which its file, cut off, is a complete log of fewer messages.
     """
 
     format: str
@@ -61,6 +63,7 @@ class Base:
     wanted: Mapping[str, tuple[str, ...]]
     guard: str = UNCHECKED
     spans: Mapping[str, tuple[tuple[int, int], ...]] | None = None
+    whole_at: tuple[int, ...] = ()
 
     @property
     def count(self) -> int:

@@ -25,9 +25,8 @@ def _made(base: Base, name: str, content: bytes, what: str, *, cut: bool = False
     if name.endswith((".csv", ".txt")):
         return edited_text(base, name, content, what)
     # Nothing counts the messages of an autopilot: one that ends with a whole message is complete.
-    return Mutated(
-        f"{name}: {what}", replaced(base, name, content), cut=cut, counted=not (cut and name.endswith((".ulg", ".bin")))
-    )
+    whole = cut and (name.endswith((".ulg", ".bin")) or len(content) in base.whole_at)
+    return Mutated(f"{name}: {what}", replaced(base, name, content), cut=cut, counted=not whole)
 
 
 def edited_text(base: Base, name: str, content: bytes, what: str, total: int | None = None) -> Mutated | None:

@@ -149,6 +149,41 @@ def test_the_profile_names_time_and_unit(tmp_path: Path) -> None:
         open_log(path, TableLayout(time="clock"))
 
 
+def test_a_damaged_name_of_version_7_3_is_read_as_it_is(tmp_path: Path) -> None:
+    path = as_hdf5(tmp_path, {"log": {"t": T, "u_surge": U, "r": R}})
+    path.write_bytes(path.read_bytes().replace(b"u_surge", b"u_s\xffrge"))
+    log = open_log(path)
+    (topic,) = log.topics
+    assert sorted(topic.fields) == ["r", "u_s\\xffrge"]
+    np.testing.assert_array_equal(log.read({topic.name: ["u_s\\xffrge"]})[topic.name].columns["u_s\\xffrge"], U)
+
+
+@pytest.mark.parametrize("sizes", [(2**31 - 1,) * 60, (2**31 - 1,) * 60 + (0,)], ids=["too large", "and a zero"])
+def test_sizes_beyond_all_numbers_are_a_variable_that_cannot_be_read(tmp_path: Path, sizes: tuple[int, ...]) -> None:
+    path = saved(tmp_path, {"t": T, "u": U, "r": R})
+    content = path.read_bytes()
+    flags = struct.pack("<IIII", 6, 8, 6, 0)
+    body = flags + struct.pack(f"<II{len(sizes)}i", 5, 4 * len(sizes), *sizes) + b"\0" * (-4 * len(sizes) % 8)
+    path.write_bytes(content + struct.pack("<II", 14, len(body) + 64) + body + b"\0" * 64)
+    log = open_log(path)
+    assert [topic.count for topic in log.topics] == [N]
+    assert log.losses
+
+
+@pytest.mark.parametrize("kind", [0, 8, 14, 164])
+def test_a_type_that_there_is_not_is_a_loss_and_no_crash(tmp_path: Path, kind: int) -> None:
+    path = saved(tmp_path, {"t": T, "u": U, "r": R, "last": R})
+    content = bytearray(path.read_bytes())
+    # The tag of its numbers, 9 for double precision, is the last before them.
+    at = content.rindex(struct.pack("<II", 9, 8 * N))
+    struct.pack_into("<I", content, at, kind)
+    path.write_bytes(content)
+    log = open_log(path)
+    assert sorted(log.topics[0].fields) == ["r", "u"]
+    (loss,) = log.losses
+    assert f"has type {kind}, not one of its class" in loss.what
+
+
 def test_one_damaged_variable_does_not_cost_the_others(tmp_path: Path) -> None:
     path = saved(tmp_path, {"a": {"t": T, "u": U}, "b": {"t": T, "u": R}}, do_compression=True)
     content = bytearray(path.read_bytes())

@@ -68,7 +68,8 @@ def _base(name: str, content: bytes, guard: str) -> Base:
     if guard == EXACT:
         # What is compressed ends with a checksum of itself.
         spans = {NAME: tuple((start + 8, end) for start, end in _tags(content))}
-    return Base("mat_file", name, {NAME: content}, NAME, truth, WANTED, guard, spans)
+    whole_at = () if name == "HDF5" else tuple(end for _, end in _tags(content))
+    return Base("mat_file", name, {NAME: content}, NAME, truth, WANTED, guard, spans, whole_at)
 
 
 def _tags(content: bytes) -> list[tuple[int, int]]:
