@@ -24,7 +24,7 @@ _HEADER = 128
 _MATRIX, _COMPRESSED = 14, 15
 _TYPES = (*range(1, 8), 9, 12, 13, _MATRIX, 16, 17, 18)
 """Types of the parts of a variable: numbers, a matrix of its own, and text."""
-_CELL, _STRUCTURE, _TEXT, _SPARSE, _NUMBERS, _COMPLEX = 1, 2, 4, 5, range(6, 16), 0x800
+_CELL, _STRUCTURE, _OBJECT, _TEXT, _SPARSE, _NUMBERS, _COMPLEX = 1, 2, 3, 4, 5, range(6, 16), 0x800
 """Classes of a variable, and the flag of complex numbers."""
 _LARGE_BYTES = 1 << 28
 _MOST_TIMES_LARGER = 100
@@ -182,8 +182,7 @@ def _held_bytes(variable: bytes, order: str) -> int:
         parts.append(variable[start:end])
         if len(parts) == 3:
             flags = int.from_bytes(parts[0][:4], "big" if order == ">" else "little")
-            sizes = np.frombuffer(parts[1], f"{order}i4").tolist() if len(parts[1]) % 4 == 0 else [0]
-            count = math.prod(sizes[:_MOST_AXES])
+            count = _count(parts[1], order)
             own = {_CELL: count, _STRUCTURE: 2, _TEXT: 1}.get(flags & 0xFF, 1 + bool(flags & _COMPLEX))
             if flags & 0xFF not in (_CELL, _STRUCTURE, _TEXT, *_NUMBERS) or not 0 <= own <= MOST_STRUCTS:
                 return int(stated)
@@ -208,19 +207,31 @@ def _part(variable: bytes, place: int, order: str) -> tuple[int, int, int, int]:
 
 def _check_parts(variable: bytes, order: str, begin: int, end: int) -> None:
     """Refuse a variable with a part that is longer than it, or of a type on which SciPy would crash (segmentation fault)."""
-    place, number, numbers = begin, 0, False
+    place, number, own_class, stated, inner = begin, 0, 0, 0, 0
     while place + 8 <= end:
         kind, start, stop, following = _part(variable, place, order)
         if stop > end:
             raise ValueError(f"its part at byte {place} is longer than it")
-        if kind not in _TYPES or (kind == _MATRIX and numbers):
+        if kind not in _TYPES or (kind == _MATRIX and own_class in (_TEXT, _SPARSE, *_NUMBERS)):
             raise ValueError(f"its part at byte {place} has type {kind}, not one of its class")
         if kind == _MATRIX:
             _check_parts(variable, order, start, stop)
+            inner += 1
         if number == 0:
             flags = int.from_bytes(variable[start : start + 4], "big" if order == ">" else "little")
-            numbers = flags & 0xFF in (_TEXT, _SPARSE, *_NUMBERS)
+            own_class = flags & 0xFF
+        elif number == 1 and own_class in (_CELL, _STRUCTURE, _OBJECT):
+            stated = _count(variable[start:stop], order)
         place, number = following, number + 1
+    if stated > max(inner, 1):
+        # Room for all of them is made before the first is read.
+        raise ValueError(f"it states {counted(stated, 'element')} and holds {inner}")
+
+
+def _count(dimensions: bytes, order: str) -> int:
+    """Return the product of the dimensions of an array."""
+    sizes = np.frombuffer(dimensions, f"{order}i4").tolist() if len(dimensions) % 4 == 0 else [0]
+    return math.prod(sizes[:_MOST_AXES])
 
 
 def _loaded(variable: bytes, order: str, header: bytes) -> Mapping[str, Any]:

@@ -184,6 +184,16 @@ def test_a_type_that_there_is_not_is_a_loss_and_no_crash(tmp_path: Path, kind: i
     assert f"has type {kind}, not one of its class" in loss.what
 
 
+def test_more_structures_than_there_are_need_no_memory(tmp_path: Path) -> None:
+    path = saved(tmp_path, {"t": T, "u": U, "last": {"a": R}})
+    content = bytearray(path.read_bytes())
+    at = content.rindex(struct.pack("<IIII", 5, 8, 1, 1), 0, content.rindex(b"last"))
+    struct.pack_into("<I", content, at + 8, 2**26)
+    path.write_bytes(content)
+    (loss,) = open_log(path).losses
+    assert "it states 67108864 elements and holds 1" in loss.what
+
+
 def test_one_damaged_variable_does_not_cost_the_others(tmp_path: Path) -> None:
     path = saved(tmp_path, {"a": {"t": T, "u": U}, "b": {"t": T, "u": R}}, do_compression=True)
     content = bytearray(path.read_bytes())
