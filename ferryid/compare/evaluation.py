@@ -23,6 +23,8 @@ from ferryid.vessel import parse_profile
 from ferryid.vessel.dimensions import window_seconds
 from ferryid.vessel.profile import Profile
 
+_Windows = tuple[Floats, Floats, Floats, Floats]
+
 
 def evaluate(
     model: Model,
@@ -133,8 +135,8 @@ def evaluate(
 
 def _in_windows(
     model: Model, old: Prediction, new: Prediction, motion: Motion, rows: Flags, profile: Profile
-) -> tuple[Floats, Floats, Floats]:
-    """Return force, and prediction errors of base model and model, averaged over windows, shape (J, 3) each.
+) -> _Windows:
+    """Return force, prediction errors of base model, model and constant velocity, averaged over windows, shape (J, 3) each.
 
     The base model of a model without a diagnosis sees a log without measured wind, current and payload, as that of a fit does.
     """
@@ -144,12 +146,12 @@ def _in_windows(
     length_s, reduced = window_seconds(own), not profile.measures_sway
     found = window_errors((base, new), motion, rows, mass, length_s, reduced=reduced)
     base_error, error = found.errors
-    return found.force, base_error, error
+    return found.force, base_error, error, found.accelerating
 
 
 def _beside_unscaled(
     model: Model, prepared: Prepared, new: Prediction, rows: Flags, profile: Profile
-) -> tuple[Floats, Floats, Floats] | None:
+) -> _Windows | None:
     """Return what `_in_windows` does with the hull of the profile as it is for a base; None where the base is that hull."""
     if model.diagnosed or not model.changed_scale:
         return None
@@ -159,21 +161,17 @@ def _beside_unscaled(
     return _in_windows(model, old, new, prepared.motion, rows, profile)
 
 
-def _beside_hull_json(
-    windows: Sequence[tuple[Floats, Floats, Floats]], model: Model, profile: Profile
-) -> dict[str, Any]:
+def _beside_hull_json(windows: Sequence[_Windows], model: Model, profile: Profile) -> dict[str, Any]:
     return {"prediction_beside_hull": _prediction_json(windows, model, profile)} if windows else {}
 
 
-def _prediction_json(
-    windows: Sequence[tuple[Floats, Floats, Floats]], model: Model, profile: Profile
-) -> dict[str, Any]:
+def _prediction_json(windows: Sequence[_Windows], model: Model, profile: Profile) -> dict[str, Any]:
     """Return the prediction errors of what `_in_windows` returned for every log."""
-    force, base, errors = (np.concatenate(columns) for columns in zip(*windows, strict=True))
+    pooled = [np.concatenate(columns) for columns in zip(*windows, strict=True)]
     return {
         "window_s": window_seconds(parse_profile(model.profile_text, model.name)),
-        "windows": len(force),
-        **_scores(window_scores(force, base, errors), profile).to_json(),
+        "windows": len(pooled[0]),
+        **_scores(window_scores(*pooled), profile).to_json(),
     }
 
 

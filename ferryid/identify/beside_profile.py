@@ -40,11 +40,10 @@ def beside_profile(model: Model, profile: Profile, logs: Sequence[LogFit]) -> tu
         bare = without_inputs(log.motion)
         both = (Prediction(hull.of(bare), bare, hull), Prediction(new.of(log.motion), log.motion, new))
         one = window_errors(both, log.motion, log.validation, mass, length_s, reduced=reduced)
-        found.append((one.force, *one.errors))
-    if not sum(len(force) for force, _, _ in found):
+        found.append((one.force, *one.errors, one.accelerating))
+    if not sum(len(force) for force, *_ in found):
         return ()
-    force, old_error, new_error = (np.concatenate(columns) for columns in zip(*found, strict=True))
-    scores = window_scores(force, old_error, new_error)
+    scores = window_scores(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
     scores = scores.without_sway() if reduced else scores
     known = {axis: float(ratio) - 1.0 for axis, ratio in zip(AXES, scores.ratio, strict=True) if np.isfinite(ratio)}
     if not known:

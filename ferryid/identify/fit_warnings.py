@@ -75,9 +75,28 @@ def general_warnings(settings: FitSettings, known: Excitation, scores: ModelScor
         )
     if settings.residual == "commanded":
         warnings.append("The correction was fitted to commanded forces; its error is judged against measured ones.")
-    for axis, share, ratio in zip(AXES, scores.force.r2_model.tolist(), scores.force.ratio.tolist(), strict=True):
-        if np.isfinite(share) and share < 0.0:
-            more = " The base model, with which the verdict compares, errs more still." if ratio < 1.0 else ""
+    return [*warnings, *_axis_warnings(scores)]
+
+
+def _axis_warnings(scores: ModelScores) -> list[str]:
+    """Say on which axes the model predicts no motion, or explains no force."""
+    force, warnings = scores.force, []
+    for axis, unit, share, ratio, error, none in zip(
+        AXES,
+        ("N", "N", "N·m"),
+        force.r2_model.tolist(),
+        force.ratio.tolist(),
+        np.sqrt(force.mse_model).tolist(),
+        np.sqrt(force.mse_constant_velocity).tolist(),
+        strict=True,
+    ):
+        more = " The base model, with which the verdict compares, errs more still." if ratio < 1.0 else ""
+        if error > none:
+            warnings.append(
+                f"In {axis} the model predicts acceleration worse than a velocity that does not change (rms error {error:.3g} "
+                f"against {none:.3g} {unit}). Do not rely on the model there.{more}"
+            )
+        elif np.isfinite(share) and share < 0.0:
             warnings.append(
                 f"In {axis} the model explains the measured force worse than its mean does (R² {share:.2f}): hardly any force "
                 f"varies there, or something else moves the vessel. Do not rely on the model there.{more}"

@@ -9,7 +9,7 @@ models are judged against knows no measured wind, current or payload, so that tw
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -142,7 +142,17 @@ class PredictionWindows:
         nothing = (np.zeros((0, 3)),) * 3
         every, base, model = (np.concatenate(part) for part in zip(nothing, *self.predicted(found), strict=True))
         found_scores = force_scores(every, base, model, np.ones(len(every), dtype=bool))
+        if len(every):
+            found_scores = replace(found_scores, mse_constant_velocity=np.mean(self._accelerating() ** 2, axis=0))
         return found_scores.without_sway() if self.settings.reduced else found_scores
+
+    def _accelerating(self) -> Floats:
+        """Return the force on the base model's mass that the measured acceleration is, shape (J, 3): the error of none."""
+        forces = [np.zeros((0, 3))]
+        for one in self.judged:
+            inertia = without_sway_coupling(one.inertia) if self.settings.reduced else one.inertia
+            forces.append(np.einsum("jab,jb->ja", inertia, one.by_velocity))
+        return np.concatenate(forces)
 
     def predicted(self, found: Coefficients) -> list[tuple[Floats, Floats, Floats]]:
         """Return the forces of the windows of every log in which models are judged, shape (J, 3) each.

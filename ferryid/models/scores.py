@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,9 @@ class ForceScores:
         MSE of the model over the base model's, shape (3,); NaN where the base model makes no error.
     normalised_mse
         Mean of the ratios that are known.
+    mse_constant_velocity
+        Mean square error of predicting that the velocity does not change, shape (3,): a model that errs more is of no use to
+        predict motion (the reference of a skill score; Murphy 1988). NaN where errors are not those of an acceleration.
     """
 
     mse_base: Floats
@@ -35,6 +38,7 @@ class ForceScores:
     r2_model: Floats
     ratio: Floats
     normalised_mse: float
+    mse_constant_velocity: Floats = field(default_factory=lambda: np.full(3, np.nan))
 
     @classmethod
     def of(cls, mse_base: Floats, mse_model: Floats, variance: Floats) -> ForceScores:
@@ -57,12 +61,18 @@ class ForceScores:
             self.r2_model * known,
             ratio,
             float(finite.mean()) if finite.size else math.nan,
+            self.mse_constant_velocity * known,
         )
 
     def to_json(self) -> dict[str, Any]:
         """Return the scores as plain values by the names of the axes."""
+        still = self.mse_constant_velocity
         return {
-            "mse": {"base": by_axis(self.mse_base), "model": by_axis(self.mse_model)},
+            "mse": {
+                "base": by_axis(self.mse_base),
+                "model": by_axis(self.mse_model),
+                **({"constant_velocity": by_axis(still)} if np.isfinite(still).any() else {}),
+            },
             "r2": {"base": by_axis(self.r2_base), "model": by_axis(self.r2_model)},
             "per_axis": by_axis(self.ratio),
             "normalised_mse": self.normalised_mse,
@@ -132,6 +142,7 @@ class ModelScores:
                 r2_model=axes(data["r2"]["model"]),
                 ratio=axes(data["per_axis"]),
                 normalised_mse=math.nan if mean is None else float(mean),
+                mse_constant_velocity=axes(data["mse"].get("constant_velocity", dict.fromkeys(AXES))),
             ),
             rows=int(data["rows"]),
             seconds=float(data["seconds"]),

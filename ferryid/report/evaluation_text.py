@@ -71,7 +71,17 @@ def _score_lines(scores: dict[str, Any], labels: tuple[str, str, str]) -> list[s
 def _prediction_lines(scores: dict[str, Any]) -> list[str]:
     if not scores["windows"]:
         return [f"  no prediction error: no unbroken stretch of {scores['window_s']:.3g} s"]
-    return _score_lines(scores, _WINDOWS)
+    lines = _score_lines(scores, _WINDOWS)
+    if (still := scores["mse"].get("constant_velocity")) is None:
+        return lines
+    root = "".join(f"{_root(still[axis]):>11}" for axis in AXES)
+    lines.insert(-1, f"{'    rms, constant velocity':<34}{root}")
+    worse = [axis for axis in AXES if scores["mse"]["model"][axis] > still[axis]]
+    if worse:
+        lines.append(
+            f"  warning: in {' and '.join(worse)} the model predicts worse than a velocity that does not change"
+        )
+    return lines
 
 
 def _beside_hull_lines(scores: dict[str, Any]) -> list[str]:

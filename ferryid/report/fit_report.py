@@ -190,8 +190,11 @@ def as_text(result: FitOutcome, stored: StoredModel, report: Path | None) -> str
     ]
     lines.append(f"{'on validation rows':<28}" + "".join(f"{axis:>12}" for axis in AXES))
     lines.append(f"{'':<28}" + "".join(f"{unit:>12}" for unit in ("[N]", "[N]", "[N·m]")))
-    for label, mse in (("base", scores.mse_base), ("new", scores.mse_model)):
-        name = f"rms {result.scores.measure} error, {label}"
+    errors = [(f"rms {result.scores.measure} error, base", scores.mse_base)]
+    errors.append((f"rms {result.scores.measure} error, new", scores.mse_model))
+    if np.isfinite(scores.mse_constant_velocity).any():
+        errors.append(("the same, constant velocity", scores.mse_constant_velocity))
+    for name, mse in errors:
         lines.append(f"{name:<28}" + "".join(f"{_three_digits(value):>12}" for value in np.sqrt(mse).tolist()))
     lines.append(f"{'R², new':<28}" + "".join(f"{_number(value):>12}" for value in scores.r2_model.tolist()))
     if model.settings.get("estimated_from"):

@@ -239,10 +239,17 @@ def _score_rows(scores: ForceScores) -> list[dict[str, Any]]:
     def row(name: str, values: Floats, pattern: str, mean: str = "") -> dict[str, Any]:
         return {"name": name, "values": [_text(value, pattern) for value in values.tolist()], "mean": mean}
 
+    still = np.sqrt(scores.mse_constant_velocity)
+    constant = (
+        [row("root-mean-square error of a constant velocity [N, N, N·m]", still, ".3g")]
+        if np.isfinite(still).any()
+        else []
+    )
     return [
         row("MSE over the base model's", scores.ratio, ".3f", _text(scores.normalised_mse, ".3f")),
         row("root-mean-square error, base [N, N, N·m]", np.sqrt(scores.mse_base), ".3g"),
         row("root-mean-square error, new [N, N, N·m]", np.sqrt(scores.mse_model), ".3g"),
+        *constant,
         row("R², base", scores.r2_base, ".3f"),
         row("R², new", scores.r2_model, ".3f"),
     ]

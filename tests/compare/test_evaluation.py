@@ -17,7 +17,7 @@ from ferryid.identify.prediction_windows import PredictionWindows
 from ferryid.identify.split import Split
 from ferryid.models import Model, blank_model, usable_rows
 from ferryid.models.forces.estimator import base_estimator, model_estimator
-from ferryid.models.prediction import Prediction, window_errors
+from ferryid.models.prediction import Prediction, window_averages, window_errors
 from ferryid.models.scores import force_scores
 from ferryid.regression.bases import make_basis
 from ferryid.report.evaluation_text import render_evaluation
@@ -131,6 +131,7 @@ def test_the_errors_in_windows_are_those_of_a_fit(fitted: FitOutcome, tmp_path: 
     told = evaluate(model, [str(LOG)], RunContext(tmp_path), window_s=1.0)["logs"][0]["prediction"]
     assert list(told["mse"]["model"].values()) == pytest.approx(expected.mse_model, rel=1e-9)
     assert list(told["mse"]["base"].values()) == pytest.approx(expected.mse_base, rel=1e-9)
+    assert list(told["mse"]["constant_velocity"].values()) == pytest.approx(expected.mse_constant_velocity, rel=1e-9)
     assert list(told["r2"]["model"].values()) == pytest.approx(expected.r2_model, rel=1e-9)
 
 
@@ -147,13 +148,23 @@ def test_a_log_shorter_than_a_window_has_no_prediction_error(tmp_path: Path) -> 
     assert not shown(text, "prediction error in windows")
 
 
-def test_a_mass_that_cannot_be_inverted_errs_without_end_and_takes_no_row(fitted: FitOutcome, tmp_path: Path) -> None:
+def test_a_mass_that_cannot_be_inverted_errs_without_end_and_takes_no_row(
+    fitted: FitOutcome, monkeypatch: pytest.MonkeyPatch
+) -> None:
     model, motion = fitted.model, fitted.logs[0].motion
     theta = model.theta.copy()
     theta[model.terms.index("u_dot"), 0] = -1e6
     two = [Prediction(motion.tau, motion, model_estimator(one)) for one in (model, replace(model, theta=theta))]
     mass = np.diag([2000.0, 2000.0, 5000.0])
-    force, (good, bad), _ = window_errors(two, motion, motion.valid, mass, 8.0)
+    force, (good, bad), _, accelerating = window_errors(two, motion, motion.valid, mass, 8.0)
+    # A model that expects no acceleration errs by all of it.
+    still = replace(model, theta=np.zeros_like(model.theta), intercept=np.zeros(3))
+    none = Prediction(np.zeros_like(motion.tau), motion, model_estimator(still))
+    monkeypatch.setattr(window_averages, "predicted_acceleration", lambda _, motion, **options: np.zeros_like(motion.nu))
+    np.testing.assert_allclose(
+        window_errors([none], motion, motion.valid, mass, 8.0).errors[0], -accelerating, rtol=1e-9
+    )
+    monkeypatch.undo()
     alone = window_errors(two[:1], motion, motion.valid, mass, 8.0)
     assert len(force) > 10
     np.testing.assert_array_equal(good, alone[1][0])

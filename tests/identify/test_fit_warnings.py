@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ferryid.identify.fit_warnings import free_run_warnings, general_warnings
@@ -45,3 +47,17 @@ def test_an_axis_that_errs_more_than_its_mean_is_told_beside_the_base_model() ->
     assert sway.endswith("The base model, with which the verdict compares, errs more still.")
     assert yaw.startswith("In yaw")
     assert yaw.endswith("Do not rely on the model there.")
+
+
+def test_an_axis_that_errs_more_than_a_constant_velocity_is_told_with_both_errors() -> None:
+    force = ForceScores.of(np.array([0.4, 4.0, 1.2]), np.array([0.01, 0.04, 0.09]), np.ones(3))
+    nothing = Excitation(np.ones(3), {}, 1.0, {}, np.ones(3))
+
+    def told(*still: float) -> list[str]:
+        scores = replace(force, mse_constant_velocity=np.array(still))
+        return general_warnings(FitSettings(), nothing, ModelScores(scores, 100, 500.0, "blocks", ()), 1)
+
+    assert told(1.0, np.nan, 0.1) == []
+    (yaw,) = told(1.0, np.nan, 0.0025)
+    assert yaw.startswith("In yaw the model predicts acceleration worse than a velocity that does not change")
+    assert "(rms error 0.3 against 0.05 N·m)" in yaw

@@ -48,7 +48,14 @@ def made(accepted: bool = True, seed: int = 0) -> Model:
         ranges={"u": (-0.5, 1.25)},
         training=({"name": "log", "files": ["log.bag"], "sha256": "ab", "seconds": 60.0, "rows": 1200},),
         scores=ModelScores(
-            ForceScores.of(np.ones(3), np.array([0.4, 0.5, 0.6]), 2.0 * np.ones(3)), 60, 6.0, "blocks", ()
+            replace(
+                ForceScores.of(np.ones(3), np.array([0.4, 0.5, 0.6]), 2.0 * np.ones(3)),
+                mse_constant_velocity=np.array([0.7, 0.8, 0.9]),
+            ),
+            60,
+            6.0,
+            "blocks",
+            (),
         ),
         accepted=accepted,
     )
@@ -60,6 +67,14 @@ def test_a_model_comes_back_to_the_last_digit(tmp_path: Path) -> None:
     for name in ("theta", "intercept", "low", "high", "intercept_low", "intercept_high", "covariance"):
         np.testing.assert_array_equal(getattr(again, name), getattr(stored.model, name))
     assert model_to_json(again) == model_to_json(stored.model)
+    assert again.scores is not None
+    np.testing.assert_array_equal(again.scores.force.mse_constant_velocity, [0.7, 0.8, 0.9])
+    raw = json.loads(stored.path.read_text())
+    del raw["scores"]["mse"]["constant_velocity"]
+    stored.path.write_text(json.dumps(raw))
+    older = load_file(stored.path).scores
+    assert older is not None
+    assert np.isnan(older.force.mse_constant_velocity).all()
 
 
 def test_what_nobody_could_read_again_is_not_stored(tmp_path: Path) -> None:

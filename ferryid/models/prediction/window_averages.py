@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from ferryid.models.forces.estimator import without_sway_coupling
 from ferryid.models.prediction.free_run import predicted_acceleration
 from ferryid.models.prediction.log_prediction import Prediction
-from ferryid.models.scores import ForceScores, force_scores
+from ferryid.models.scores import ForceScores, force_scores, mean_square
 from ferryid.regression import window_rows, window_starts, window_sums, window_weights
 from ferryid.signals.track import Motion, segments
 from ferryid.types import Flags, Floats
@@ -28,11 +29,14 @@ class WindowErrors(NamedTuple):
         matrix cannot be inverted.
     starts_s
         When each window starts [s], shape (J,).
+    accelerating
+        The measured acceleration as a force, shape (J, 3): how far a velocity that does not change is off.
     """
 
     force: Floats
     errors: list[Floats]
     starts_s: Floats
+    accelerating: Floats
 
 
 def window_errors(
@@ -73,9 +77,12 @@ def window_errors(
     for one, acceleration, some in zip(predictions, expected, known, strict=True):
         error = window_sums(acceleration, weight, starts) + window_sums(one.motion.nu, slope, starts)
         errors.append(error @ mass.T if some.any() else np.full_like(error, np.inf))
-    return WindowErrors(window_sums(motion.tau, weight, starts), errors, motion.t[starts])
+    accelerating = -window_sums(motion.nu, slope, starts) @ mass.T
+    return WindowErrors(window_sums(motion.tau, weight, starts), errors, motion.t[starts], accelerating)
 
 
-def window_scores(force: Floats, base: Floats, model: Floats) -> ForceScores:
+def window_scores(force: Floats, base: Floats, model: Floats, accelerating: Floats) -> ForceScores:
     """Return the scores of a model beside its base model of what `window_errors` returns, shape (J, 3) each."""
-    return force_scores(force, force - base, force - model, np.ones(len(force), dtype=bool))
+    rows = np.ones(len(force), dtype=bool)
+    scores = force_scores(force, force - base, force - model, rows)
+    return replace(scores, mse_constant_velocity=mean_square(accelerating, np.zeros_like(accelerating), rows))
