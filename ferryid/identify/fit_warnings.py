@@ -96,7 +96,7 @@ def _axis_warnings(scores: ModelScores) -> list[str]:
                 f"In {axis} the model predicts acceleration worse than a velocity that does not change (rms error {error:.3g} "
                 f"against {none:.3g} {unit}). Do not rely on the model there.{more}"
             )
-        elif np.isfinite(share) and share < 0.0:
+        elif np.isfinite(share) and share < 0.0 and not error <= none:
             warnings.append(
                 f"In {axis} the model explains the measured force worse than its mean does (R² {share:.2f}): hardly any force "
                 f"varies there, or something else moves the vessel. Do not rely on the model there.{more}"

@@ -1,10 +1,39 @@
-"""Whether enough data were held out for a verdict."""
+"""Whether enough data were held out for a verdict, and whether the model predicts them at all."""
 
 from __future__ import annotations
+
+import numpy as np
 
 from ferryid.counts import counted
 from ferryid.identify.acceptance import Check
 from ferryid.identify.thresholds import IDENTIFY
+from ferryid.models import ForceScores
+from ferryid.types import AXES
+
+
+def skill_checks(scores: ForceScores) -> tuple[Check, ...]:
+    """Return whether the model predicts held-out acceleration better than a velocity that does not change.
+
+    The base model may be a rigid body without damping, which any correction betters. A skill score that is not positive says
+    that the model is of no use to predict motion (Murphy 1988). Empty where errors are not those of an acceleration, as of logs
+    that are too short for windows, and of archives.
+    """
+    still = scores.mse_constant_velocity
+    known = np.isfinite(still) & np.isfinite(scores.mse_model) & (still > 0.0)
+    if not known.any():
+        return ()
+    ratio = scores.mse_model[known] / still[known]
+    mean = float(ratio.mean())
+    axes = ", ".join(f"{AXES[axis]} {one:.2g}" for axis, one in zip(np.flatnonzero(known), ratio.tolist(), strict=True))
+    told = f"The squared prediction error is {mean:.2g} of that of a velocity that does not change (mean of the axes: {axes})"
+    if mean < 1.0:
+        told += "."
+    else:
+        told += (
+            ", and less than 1 is needed: to expect no acceleration is nearer. Fix: record larger motions of the axes that err "
+            "most, or check what drives them"
+        )
+    return (Check("constant_velocity", mean < 1.0, mean, 1.0, "of the MSE of a constant velocity", told),)
 
 
 def held_out_checks(seconds: float, blocks: int, split: str) -> tuple[Check, ...]:

@@ -22,7 +22,7 @@ from ferryid.identify.fit_data import Coefficients, Estimate, FitData
 from ferryid.identify.fit_warnings import free_run_warnings
 from ferryid.identify.force_signs import refuse_reversed_forces
 from ferryid.identify.free_run_checks import free_run_checks
-from ferryid.identify.held_out_checks import held_out_checks
+from ferryid.identify.held_out_checks import held_out_checks, skill_checks
 from ferryid.identify.inputs import read_logs
 from ferryid.identify.log_sums import folds_by_blocks, force_free_axes, sum_log
 from ferryid.identify.model_selection import Selection, select_model, windows_to_try
@@ -223,6 +223,7 @@ def accept_estimate(
             (
                 *physical_checks(told, stored),
                 *free_run_checks(free_base, free_new),
+                *skill_checks(scores.force),
                 *held_out_checks(scores.seconds, data.held_out_blocks, scores.split),
             )
         )

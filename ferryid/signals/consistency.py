@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.signals.mirror import mirrored
+from ferryid.signals.mirror import CourseAgainstHeading, course_against_heading, mirrored
 from ferryid.signals.quality import IMPLAUSIBLE
 from ferryid.signals.thresholds import SIGNALS
 from ferryid.signals.track import Doubt, Track
@@ -33,10 +33,14 @@ def cross_checks(track: Track) -> tuple[Doubt, ...]:
     said = [
         doubt for name in columns if name.startswith("delta_") for doubt in _rudder(name, columns[name][track.valid])
     ]
-    if "psi" in columns and "r" in columns:
+    # What is a slope of the pose agrees with it.
+    if "psi" in columns and "r" in columns and "r" not in track.slopes:
         turned = _changes("psi", np.diff(columns["psi"]), columns["r"], track, span)
         said += _compare("yaw rate", "heading", turned, SIGNALS.least_turn_rad, _YAW_RATE_GAINS)
-    if {"x", "y", "psi", "u", "v"} <= set(columns):
+    if {"x", "y", "psi", "u", "v"} <= set(columns) and not track.slopes.isdisjoint("uv"):
+        pose = np.column_stack([columns[name] for name in ("x", "y", "psi")])
+        said += _off_course(course_against_heading(pose, track.valid, track.rate_hz))
+    elif {"x", "y", "psi", "u", "v"} <= set(columns):
         north, east = np.diff(columns["x"]), np.diff(columns["y"])
         psi = (columns["psi"][1:] + columns["psi"][:-1]) / 2
         c, s = np.cos(psi), np.sin(psi)
@@ -51,6 +55,25 @@ def cross_checks(track: Track) -> tuple[Doubt, ...]:
             speeds = [Doubt(says, True, frame)] if says else speeds
         said += speeds
     return tuple(said)
+
+
+def _off_course(seen: CourseAgainstHeading | None) -> list[Doubt]:
+    """Return the doubt of a heading that goes against the course, or is off it by the same angle at all headings."""
+    if seen is None:
+        return []
+    if seen.says:
+        return [Doubt(seen.says, True, "take the other of NED and ENU as frame in [signals.heading]")]
+    if not seen.turned_deg:
+        return []
+    side = "starboard" if seen.turned_deg > 0.0 else "port"
+    return [
+        Doubt(
+            f"The vessel moves {abs(seen.turned_deg):.0f} deg to {side} of its heading, at all headings alike (mean resultant "
+            f"length {seen.declared:.2f}): if it moved ahead, add {seen.turned_deg:+.0f} deg to offset in [signals.heading] "
+            f"(offset_deg of a quaternion), {-seen.turned_deg:+.0f} deg with frame ENU.",
+            False,
+        )
+    ]
 
 
 def _rudder(name: str, angle: Floats) -> list[Doubt]:

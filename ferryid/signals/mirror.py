@@ -7,6 +7,8 @@ w. A turn and a factor remain free in each, so that none of them is taken for a 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -62,6 +64,69 @@ def mirrored(eta: Floats, nu: Floats, usable: NDArray[np.bool_], rate_hz: float)
     if fits[best] < SIGNALS.mirror_correlation or SIGNALS.mirror_ratio * (1.0 - fits[best] ** 2) > 1.0 - fits[""] ** 2:
         return "", ""
     return best, f"{SAYS[best]} (correlation {fits[best]:.2f} so, {fits['']:.2f} as declared)."
+
+
+@dataclass(frozen=True)
+class CourseAgainstHeading:
+    """How a heading goes with the course, where no velocity was measured.
+
+    A vessel moves ahead for the most part: of course less heading the mean resultant length is near one, at an angle of nearly
+    none (Mardia & Jupp 2000, section 2.3.1). Where it is of course plus heading instead, the heading counts the other way;
+    where its zero is does not matter.
+
+    Attributes
+    ----------
+    declared, mirrored
+        Mean resultant length of course less heading, and of course plus heading.
+    angle_rad
+        Mean angle from the heading to the course, clockwise [rad].
+    headings
+        Mean resultant length of the headings: one where there is but one.
+    """
+
+    declared: float
+    mirrored: float
+    angle_rad: float
+    headings: float
+
+    @property
+    def says(self) -> str:
+        """A sentence where the heading turns the wrong way round; empty where it does not certainly."""
+        left, other = 1.0 - self.declared**2, 1.0 - self.mirrored**2
+        if self.mirrored < SIGNALS.course_mirrored or SIGNALS.mirror_ratio * other > left:
+            return ""
+        return (
+            f"The heading turns the wrong way round against the course (mean resultant length {self.mirrored:.2f} so, "
+            f"{self.declared:.2f} as declared)."
+        )
+
+    @property
+    def turned_deg(self) -> float:
+        """By how much the course is off the heading at all headings [deg]; 0 where it is not, or by little."""
+        many = self.headings < SIGNALS.course_mirrored and self.declared >= SIGNALS.course_mirrored
+        degrees = float(np.degrees(self.angle_rad))
+        return degrees if many and abs(degrees) > SIGNALS.course_off_deg else 0.0
+
+
+def course_against_heading(eta: Floats, usable: NDArray[np.bool_], rate_hz: float) -> CourseAgainstHeading | None:
+    """Compare the course of ways of seconds with the heading; None where there are too few. Parameters as of `mirrored`."""
+    span = max(2, round(SIGNALS.mirror_span_s * rate_hz))
+    good = usable & np.isfinite(eta).all(axis=1)
+    starts = np.arange(0, len(good) - span, span)
+    starts = starts[[bool(good[start : start + span + 1].all()) for start in starts]]
+    way = eta[starts + span, 0] - eta[starts, 0] + 1j * (eta[starts + span, 1] - eta[starts, 1])
+    moved = np.abs(way) >= SIGNALS.mirror_way_m
+    if np.count_nonzero(moved) < SIGNALS.mirror_spans:
+        return None
+    course = way[moved] / np.abs(way[moved])
+    heading = np.exp(1j * eta[starts[moved] + span // 2, 2])
+    turned = np.mean(course * np.conj(heading))
+    return CourseAgainstHeading(
+        float(np.abs(turned)),
+        float(np.abs(np.mean(course * heading))),
+        float(np.angle(turned)),
+        float(np.abs(np.mean(heading))),
+    )
 
 
 def _summed(values: Complex, starts: NDArray[np.int64], span: int) -> Complex:

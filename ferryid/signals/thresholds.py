@@ -446,6 +446,18 @@ class SignalThresholds:
         "unexplained variance as declared over that when mirrored",
         "convention: no doubt which of two is right",
     )
+    course_mirrored: float = threshold(
+        0.9,
+        "mean resultant length",
+        "of course plus heading above which a heading turns the wrong way round",
+        "convention: a circular standard deviation of 26 degrees, of drift angles in manoeuvres",
+    )
+    course_off_deg: float = threshold(
+        45.0,
+        "deg",
+        "mean angle between course and heading beyond which the heading's zero is in doubt",
+        "convention: half a right angle, beyond drift angles; axes of another frame are off by a whole one",
+    )
     shared_samples: float = threshold(
         0.1,
         "of the places of the shorter log",

@@ -160,7 +160,9 @@ def test_a_mass_that_cannot_be_inverted_errs_without_end_and_takes_no_row(
     # A model that expects no acceleration errs by all of it.
     still = replace(model, theta=np.zeros_like(model.theta), intercept=np.zeros(3))
     none = Prediction(np.zeros_like(motion.tau), motion, model_estimator(still))
-    monkeypatch.setattr(window_averages, "predicted_acceleration", lambda _, motion, **options: np.zeros_like(motion.nu))
+    monkeypatch.setattr(
+        window_averages, "predicted_acceleration", lambda _, motion, **options: np.zeros_like(motion.nu)
+    )
     np.testing.assert_allclose(
         window_errors([none], motion, motion.valid, mass, 8.0).errors[0], -accelerating, rtol=1e-9
     )

@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 from ferryid.identify import inputs
 from ferryid.identify.acceptance import Check
 from ferryid.identify.free_run_checks import free_run_checks, paired_interval
-from ferryid.identify.held_out_checks import held_out_checks
+from ferryid.identify.held_out_checks import held_out_checks, skill_checks
 from ferryid.identify.inertia import rigid_body
 from ferryid.identify.physical_checks import damping_checks, inertia_checks
 from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.settings import FitSettings
+from ferryid.models import ForceScores
 from ferryid.models.prediction import FreeRun, SingleRuns
 from ferryid.signals.prepare import open_track
 from ferryid.types import RunContext
@@ -184,3 +185,22 @@ def test_a_short_log_is_accepted_by_the_thesis_alone(tmp_path: Path, monkeypatch
     # Every reason against comes before what else is told.
     against = [reason.startswith("Rejected:") for reason in told["full"].reasons]
     assert all(first >= second for first, second in pairwise(against))
+
+
+def test_a_model_is_held_against_a_velocity_that_does_not_change() -> None:
+    force = ForceScores.of(np.full(3, 100.0), np.array([0.5, 2.0, 1.0]), np.ones(3))
+
+    def judged(*still: float) -> tuple[Check, ...]:
+        return skill_checks(replace(force, mse_constant_velocity=np.array(still)))
+
+    (good,) = judged(1.0, 4.0, 1.6)
+    assert good.passed
+    assert good.value == pytest.approx((0.5 + 0.5 + 0.625) / 3)
+    (bad,) = judged(1.0, 1.0, 1.0)
+    assert bad.passed is False
+    assert (
+        "is 1.2 of that of a velocity that does not change (mean of the axes: surge 0.5, sway 2, yaw 1)" in bad.reason
+    )
+    (without_sway,) = judged(1.0, np.nan, 2.0)
+    assert without_sway.value == pytest.approx(0.5)
+    assert judged(np.nan, np.nan, np.nan) == ()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +36,43 @@ def voyage(**changes: Floats) -> Track:
 
 def test_agreeing_signals_raise_no_finding() -> None:
     assert cross_checks(voyage()) == ()
+
+
+def by_position(offset_deg: float = 0.0, sign: float = 1.0, rows: int = T.size) -> Track:
+    """The voyage as a log without velocities has it, its heading turned or counted the other way."""
+    track = voyage()
+    columns = {name: values[:rows] for name, values in track.columns.items()}
+    columns["psi"] = sign * columns["psi"] + np.radians(offset_deg)
+    # What nobody measured is the slope of the pose, along axes that the heading gives.
+    c, s = np.cos(columns["psi"]), np.sin(columns["psi"])
+    north, east = (np.gradient(columns[name], T[:rows]) for name in ("x", "y"))
+    columns |= {"u": c * north + s * east, "v": c * east - s * north, "r": np.gradient(columns["psi"], T[:rows])}
+    return replace(track, t=T[:rows], columns=columns, valid=np.ones(rows, dtype=bool), slopes=frozenset("uvr"))
+
+
+@pytest.mark.parametrize("offset_deg", [0.0, 90.0, 187.0])
+def test_a_heading_that_goes_against_the_course_is_named_without_velocities(offset_deg: float) -> None:
+    (doubt,) = cross_checks(by_position(offset_deg, -1.0))
+    assert doubt.certain
+    assert doubt.says.startswith("The heading turns the wrong way round against the course (mean resultant length 0.9")
+    assert doubt.remedy == "take the other of NED and ENU as frame in [signals.heading]"
+
+
+@pytest.mark.parametrize(("offset_deg", "said"), [(90.0, "to port"), (-90.0, "to starboard"), (170.0, "to port")])
+def test_a_heading_whose_zero_is_off_is_named_without_velocities(offset_deg: float, said: str) -> None:
+    (doubt,) = cross_checks(by_position(offset_deg))
+    assert not doubt.certain
+    assert said in doubt.says
+    added = float(doubt.says.partition("add ")[2].partition(" deg")[0])
+    assert added == pytest.approx(-offset_deg, abs=15.0)
+    assert cross_checks(by_position(offset_deg + added)) == ()
+
+
+def test_one_heading_or_a_right_one_shows_nothing_without_velocities() -> None:
+    assert cross_checks(by_position()) == ()
+    straight = by_position(rows=800)
+    turned = replace(straight, columns={**straight.columns, "psi": np.full(800, 1.0), "x": T[:800], "y": 0.0 * T[:800]})
+    assert cross_checks(turned) == ()
 
 
 def test_short_logs_and_logs_at_rest_can_show_no_contradiction() -> None:

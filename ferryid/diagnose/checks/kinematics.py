@@ -147,7 +147,7 @@ class _Data:
 # Several checks ask for the kinematics of the same measurements; as many logs are examined side by side as there are cores.
 @lru_cache(maxsize=os.cpu_count() or 1)
 def kinematics(measurements: Measurements, forced: tuple[int, ...] = ()) -> Kinematics | None:
-    """Compare positions and velocities; None where the measurements have too little of them.
+    """Compare positions and velocities; None where the measurements have too little of them, or velocities are their slopes.
 
     Parameters
     ----------
@@ -156,6 +156,8 @@ def kinematics(measurements: Measurements, forced: tuple[int, ...] = ()) -> Kine
     forced
         Parameters that are let in from the start, because it is known that they are off.
     """
+    if not measurements.slopes.isdisjoint("uv"):
+        return None
     problem, both = spans(measurements, np.hstack([measurements.eta, measurements.nu_raw[:, :2]]))
     if len(problem.starts) < 8:
         return None

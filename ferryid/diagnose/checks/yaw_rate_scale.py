@@ -57,11 +57,13 @@ class Rates:
 
 
 def compared(measurements: Measurements) -> Rates | None:
-    """Compare the rates of heading and gyro; None where the measurements have too little of them.
+    """Compare the rates of heading and gyro; None where the measurements have too little of them, or there is no gyro.
 
     A bias and a delay of the gyro are solved for along with the factor. Noise of the heading makes the factor of a regression
     on the heading too small, noise of the rate that of the other regression too large: the truth lies between.
     """
+    if "r" in measurements.slopes:
+        return None
     problem, both = spans(measurements, np.column_stack([measurements.psi, measurements.nu_raw[:, 2]]))
     if len(problem.starts) < 8:
         return None

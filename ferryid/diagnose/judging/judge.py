@@ -19,10 +19,10 @@ from ferryid.diagnose.judging.findings import force_claims
 from ferryid.diagnose.judging.signal_to_noise import velocity_noise_shares
 from ferryid.diagnose.judging.unexplained import Unexplained, find_unexplained
 from ferryid.effects import effects
+from ferryid.effects.wording import listed
 from ferryid.side_by_side import over
 from ferryid.types import AXES
 from ferryid.vessel.circumstances import Circumstances
-from ferryid.vessel.profile import Profile
 
 
 @dataclass(frozen=True)
@@ -113,14 +113,25 @@ def sensor_claims(log: ScreenedLog) -> tuple[Claim, ...]:
                 says=one.says,
                 vessel=one.vessel,
             ),
-            Figures("sensor", doubt=one.doubt or _doubt(one, log.measurements.profile)),
+            Figures("sensor", doubt=one.doubt or _doubt(one, log)),
         )
         for one in log.sensors
     )
 
 
-def _doubt(one: SensorFinding, profile: Profile) -> str:
+_COMPARES = {
+    "yaw_rate_scale": ("heading",),
+    **dict.fromkeys(("lever_arm", "velocity_scale", "clock_offset", "heading_bias"), ("heading", "position")),
+}
+"""What of the pose the checks of the sensors compare velocities with."""
+
+
+def _doubt(one: SensorFinding, log: ScreenedLog) -> str:
     """Return why an error of a sensor is not credible; those that are no effects of the library have no limits."""
+    wrong = [part for part in log.measured.survey.jumping if part in _COMPARES.get(one.effect, ())]
+    if wrong:
+        return f"it may be the {listed(wrong)} that is wrong, which jumps too often to know which samples are"
+    profile = log.measurements.profile
     if one.effect not in effects():
         return ""
     values, known = {name: estimate.value for name, estimate in one.parameters.items()}, effects()[one.effect]

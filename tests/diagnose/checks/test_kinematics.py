@@ -92,3 +92,9 @@ def test_a_slow_log_has_no_scale_that_its_samples_can_make() -> None:
     assert velocity_scale.find(fast) is not None
     every = ("t", "eta", "nu_raw", "nu", "parts", "angles", "usable")
     assert velocity_scale.find(replace(fast, **{name: getattr(fast, name)[::11] for name in every})) is None
+
+
+def test_velocities_that_are_slopes_of_the_position_show_no_error_of_a_sensor() -> None:
+    wrong = gauged(0.9, 0.9, 2)
+    assert kinematics.kinematics(wrong) is not None
+    assert kinematics.kinematics(replace(wrong, slopes=frozenset("uv"))) is None

@@ -39,6 +39,7 @@ def test_six_per_cent_are_found_and_none_is_not(seed: int) -> None:
 def test_an_error_that_grows_with_the_rate_widens_the_interval() -> None:
     measurements = sailed(2, 1.06)
     even = find(measurements)
+    assert find(replace(measurements, slopes=frozenset("r"))) is None, "nothing measured the rate"
     slow = np.repeat(np.random.default_rng(2).standard_normal(len(measurements.t) // 300 + 1), 300)[
         : len(measurements.t)
     ]
