@@ -151,7 +151,7 @@ def _best(groups: Sequence[FieldGroup], samples: Samples) -> _Agreement | None:
     others = [one for one in groups if one.kind == "velocity" and one != best.velocity]
     seen = [max((_along_hull(one.pose, other, samples) for other in others), default=0.0) for one in same]
     if max(seen) < DRAFT.agrees:
-        seen = [_along(one.pose) for one in same]
+        seen = [_course(one.pose).steady for one in same]
     return same[int(np.argmax(seen))]
 
 
@@ -229,7 +229,7 @@ def _poses(position: FieldGroup | None, heading: FieldGroup, samples: Samples) -
 def _agreement(pose: _Pose, velocity: FieldGroup | None, samples: Samples) -> _Agreement:
     """Return how a velocity agrees with a pose; without a velocity, how steadily the vessel moves along its heading."""
     if velocity is None:
-        return _Agreement(_along(pose), "", 1.0, 0.0, None, pose)
+        return _Agreement(_course(pose).steady, "", 1.0, 0.0, None, pose)
     first, second = (_smoothed(samples, velocity, place) for place in (0, 1))
     ahead, aside = to_body(pose.north, pose.east, pose.psi)
     named = velocity.frame or velocity.named_frame
@@ -252,18 +252,40 @@ def _agreement(pose: _Pose, velocity: FieldGroup | None, samples: Samples) -> _A
     return best
 
 
-def _along(pose: _Pose) -> float:
-    """Return how nearly the vessel moves along its heading: 1 always, 0 in all directions alike."""
+@dataclass(frozen=True)
+class _Course:
+    """How the course goes with the heading: the mean of their difference as a point of the unit circle."""
+
+    mean: complex = 0j
+
+    @property
+    def along(self) -> float:
+        """How nearly the vessel moves along its heading: 1 always, 0 in all directions alike, -1 always astern."""
+        return self.mean.real
+
+    @property
+    def off_deg(self) -> float:
+        """By how much the course is off the heading at all headings, clockwise [deg]; 0 where it is not by the same angle."""
+        return float(np.degrees(np.angle(self.mean))) if abs(self.mean) >= DRAFT.steady_course else 0.0
+
+    @property
+    def steady(self) -> float:
+        """How well the heading tells the course: as `along`, or a little less where its zero would have to be another."""
+        return max(self.along, abs(self.mean) - DRAFT.other_zero)
+
+
+def _course(pose: _Pose) -> _Course:
+    """Return how the course of a vessel that moves goes with its heading."""
     speed = np.hypot(pose.north, pose.east)
     rows = np.isfinite(speed + pose.psi)
     if not rows.any():
-        return 0.0
+        return _Course()
     rows &= usual(speed, rows)
     rows &= speed > DRAFT.moving * float(np.quantile(speed[rows], 0.95)) if rows.any() else rows
     if np.count_nonzero(rows) < DRAFT.fewest_rows:
-        return 0.0
+        return _Course()
     course = np.arctan2(pose.east[rows], pose.north[rows])
-    return float(np.mean(np.cos(course - pose.psi[rows])))
+    return _Course(complex(np.mean(np.exp(1j * (course - pose.psi[rows])))))
 
 
 def _position(pose: _Pose, chosen: _Agreement, named: str) -> MappedSignal:
@@ -286,7 +308,9 @@ def _position(pose: _Pose, chosen: _Agreement, named: str) -> MappedSignal:
 
 def _shown(chosen: _Agreement) -> str:
     if chosen.velocity is None:
-        return f"the vessel moves along its heading (mean cosine {chosen.share:.2f})"
+        along = _course(chosen.pose).along
+        how = "moves along its heading" if along >= DRAFT.agrees else "does not move along its heading as it is read"
+        return f"the vessel {how} (mean cosine {along:.2f})"
     turned = ", turned by the heading," if chosen.frame in _BODY else ""
     label = chosen.velocity.label
     if chosen.share < DRAFT.agrees:
@@ -311,7 +335,8 @@ def _heading(
     pose = chosen.pose
     known = slope[np.isfinite(slope)]
     turned = float(np.degrees(np.quantile(np.abs(known), 0.99))) if known.size else 0.0
-    seen, along = _hull_velocity(chosen, groups, samples), _along(pose)
+    seen, course = _hull_velocity(chosen, groups, samples), _course(pose)
+    along = course.along
     doubts = list(_mirror(pose, named))
     evidence = f"it turns at up to {turned:.1f} deg/s"
     if seen is not None:
@@ -319,6 +344,14 @@ def _heading(
         evidence = f"turned by it, the slope of the position explains {100 * share:.0f} % of {label}; {evidence}"
     elif along >= DRAFT.agrees:
         evidence = f"the vessel moves along it (mean cosine {along:.2f}); {evidence}"
+    elif course.off_deg:
+        offset = -course.off_deg if pose.heading_frame == "ENU" else course.off_deg
+        key = "offset_deg" if pose.heading_unit == "quaternion" else "offset"
+        value = np.radians(offset) if pose.heading_unit == "rad" else offset
+        doubts.append(
+            f"course and heading are {abs(course.off_deg):.0f} deg apart at all headings (mean resultant length "
+            f"{abs(course.mean):.2f}): if the vessel moved ahead, add {key} = {value:.3g}"
+        )
     else:
         doubts.append(
             f"the motion does not show its zero and sign (mean cosine of course and heading {along:.2f}): it has to rise in a "

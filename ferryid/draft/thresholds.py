@@ -66,6 +66,18 @@ class DraftThresholds:
     moving: float = threshold(
         0.3, "of the speed that 95 % of the rows do not exceed", "slower rows show no course", "convention: a third"
     )
+    steady_course: float = threshold(
+        0.9,
+        "mean resultant length",
+        "of course less heading from which they are apart by one angle",
+        "convention: a circular standard deviation of 26 degrees, of drift angles in manoeuvres",
+    )
+    other_zero: float = threshold(
+        0.1,
+        "-",
+        "by which a heading with another zero has to tell the course better than one as it is",
+        "convention: on a straight run any heading tells it with some zero",
+    )
     gain: float = threshold(
         0.15,
         "of the logarithm",

@@ -49,6 +49,30 @@ def test_a_geodetic_position_tells_a_chart_from_its_mirror_image(tmp_path: Path,
     assert not any("mirror image" in one for one in (*found["position"].doubts, *found["heading"].doubts))
 
 
+@pytest.mark.parametrize("mirrored", [True, False])
+@pytest.mark.parametrize("zero_deg", [0.0, 100.0, 180.0])
+def test_the_course_shows_how_a_heading_counts_and_where_its_zero_is(
+    tmp_path: Path, zero_deg: float, mirrored: bool
+) -> None:
+    c = sailed()
+    latitude, longitude = 63.4 + c["N"] / 111_400.0, 10.4 + c["E"] / (111_400.0 * np.cos(np.radians(63.4)))
+    yaw = np.degrees(0.5 * np.pi - c["psi"] if mirrored else c["psi"]) + zero_deg
+    rows = np.column_stack([c["t"], latitude, longitude, np.mod(yaw, 360.0), c["n"]])
+    path = tmp_path / "log.csv"
+    np.savetxt(path, rows, "%.9g", ",", header="t,latitude,longitude,yaw,rpm", comments="")
+    found = {signal.quantity: signal for signal in draft_profile(path).every}
+    heading = found["heading"]
+    assert heading.frame == ("ENU" if mirrored else "NED")
+    if zero_deg == 0.0:
+        assert any("moves along it" in one for one in heading.evidence)
+        assert not any("offset" in one for one in heading.doubts)
+        return
+    (doubt,) = (one for one in heading.doubts if "offset" in one)
+    added = float(doubt.rpartition("= ")[2])
+    assert np.cos(np.radians(added + zero_deg)) > np.cos(np.radians(10.0))
+    assert any("does not move along its heading as it is read" in one for one in found["position"].evidence)
+
+
 def test_the_messages_may_say_in_which_frame_they_are() -> None:
     """Simulated logs are in NED and FRD, as their headers say."""
     found = {signal.quantity: signal for signal in draft_profile(FIXTURES / "short.mcap").every}
