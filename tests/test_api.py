@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import inspect
 import os
+import shutil
 import subprocess
 import sys
 from functools import partial
@@ -87,6 +88,19 @@ def test_from_a_log_to_a_comparison(tmp_path: Path) -> None:
     assert api.evaluate("milliampere", [SHORT], tmp_path).tables["scores"]["log"].tolist() == ["short"] * 3
     assert api.models(tmp_path).tables["models"]["version"].tolist() == [1, 2]
     assert set(fitted.figures) == {one.stem for one in fitted.report.parent.glob("*.svg")}
+
+
+def test_a_log_beside_an_unfinished_draft_is_inspected(tmp_path: Path) -> None:
+    shutil.copy(SHORT, tmp_path)
+    draft = tmp_path / "vessel.toml"
+    draft.write_text("[vessel]\nname = 'mine'\n\n[hull]\n# FILL IN\n# mass_kg =\n")
+    said: list[str] = []
+    seen = api.inspect(tmp_path / SHORT.name, announce=said.append)
+    assert seen.json["topics"]
+    (line,) = said
+    assert line.startswith(f"no profile is used: {draft}")
+    with pytest.raises(FerryIdError):
+        api.inspect(tmp_path / SHORT.name, draft)
 
 
 def test_a_notebook_shows_the_page_or_the_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -40,7 +40,7 @@ def inspect(
         Path; parts of one recording joined by ``+``.
     vessel
         Name of a profile, the path of a TOML file, or a profile; what is stated beside the log or in ``$FERRYID_VESSEL`` where
-        None, and where nothing is, every profile that has a name is tried.
+        None, and where nothing is, or its profile has a fault, every profile that has a name is tried.
     verify
         Read the whole file and check every checksum.
     width
@@ -48,6 +48,7 @@ def inspect(
     announce
         Called with the vessel that is stated.
     """
+    from ferryid.errors import FerryIdError
     from ferryid.signals.inspect import inspect as inspect_log
     from ferryid.signals.inspect import render_inspect
     from ferryid.vessel import stated_choice
@@ -56,7 +57,12 @@ def inspect(
     if vessel is not None or ranges:
         profile: Profile | None = chosen_vessel([path], vessel, announce)
     else:
-        profile = announced(stated_choice([path]), announce)
+        try:
+            profile = announced(stated_choice([path]), announce)
+        except FerryIdError as error:
+            # A draft that is not filled in yet: what the log holds is what fills it in.
+            announce(f"no profile is used: {error}")
+            profile = None
     result = inspect_log(path, profile, verify=verify, ranges=tuple(ranges))
     return outcome_of(result, render_inspect(result, width))
 
