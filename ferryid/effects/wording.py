@@ -18,6 +18,7 @@ PARAMETER_WORDS = {
     "std": "standard deviation",
     "force_std": "standard deviation of the force",
     "moment_std": "standard deviation of the moment",
+    "otherwise": "factor on its thrust curve at other times",
     "onset": "it began at",
     "offset": "it ended at",
     "growth": "strength at the end of the log over that at its start",
