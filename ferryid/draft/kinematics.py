@@ -270,7 +270,7 @@ class _Course:
 
     @property
     def steady(self) -> float:
-        """How well the heading tells the course: as `along`, or a little less where its zero would have to be another."""
+        """How well heading and course agree: as `along`, or a little less where its zero would have to be another."""
         return max(self.along, abs(self.mean) - DRAFT.other_zero)
 
 

@@ -75,8 +75,8 @@ class DraftThresholds:
     other_zero: float = threshold(
         0.1,
         "-",
-        "by which a heading with another zero has to tell the course better than one as it is",
-        "convention: on a straight run any heading tells it with some zero",
+        "by which a heading with another zero has to agree better with the course than one as it is",
+        "convention: on a straight run any heading agrees with some zero",
     )
     gain: float = threshold(
         0.15,
