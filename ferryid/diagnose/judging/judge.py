@@ -130,7 +130,7 @@ def _doubt(one: SensorFinding, log: ScreenedLog) -> str:
     """Return why an error of a sensor is not credible; those that are no effects of the library have no limits."""
     wrong = [part for part in log.measured.survey.jumping if part in _COMPARES.get(one.effect, ())]
     if wrong:
-        return f"it may be the {listed(wrong)} that is wrong, which jumps too often to know which samples are"
+        return f"too many samples of the {listed(wrong)} that it was compared with jump to know which are wrong"
     profile = log.measurements.profile
     if one.effect not in effects():
         return ""

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 
 from ferryid.diagnose.checks import SensorFinding
 from ferryid.diagnose.checks.screening import ScreenedLog
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.judging.conclude import remedies
+from ferryid.diagnose.judging.judge import sensor_claims
 from ferryid.effects.force_model import Measurements
 from ferryid.vessel import load_profile
 from tests.diagnose.judging.findings import found
@@ -39,3 +42,25 @@ def test_the_line_of_the_profile_follows_a_sure_error() -> None:
 
 def test_what_the_signal_map_cannot_correct_has_no_line() -> None:
     assert remedies(screened("held_samples"), [found("held_samples")]) == ()
+
+
+@pytest.mark.parametrize(
+    ("effect", "jumping", "doubted"),
+    [
+        ("yaw_rate_scale", ("heading",), "heading"),
+        ("yaw_rate_scale", ("position",), ""),
+        ("lever_arm", ("position", "heading"), "position and heading"),
+        ("held_samples", ("position",), ""),
+    ],
+)
+def test_an_error_beside_a_pose_that_jumps_is_doubted(effect: str, jumping: tuple[str, ...], doubted: str) -> None:
+    log = screened(effect)
+    survey: Any = SimpleNamespace(jumping=jumping)
+    measured: Any = SimpleNamespace(survey=survey)
+    place = {one: Estimate(0.5, 0.4, 0.6, "m") for one in "xy"}
+    errors = tuple(replace(one, parameters=place) if effect == "lever_arm" else one for one in log.sensors)
+    (claim,) = sensor_claims(replace(log, measured=measured, sensors=errors))
+    wanted = (
+        f"too many samples of the {doubted} that it was compared with jump to know which are wrong" if doubted else ""
+    )
+    assert claim.figures.doubt == wanted
