@@ -199,6 +199,9 @@ def _unit(role: str, field: ActuatorField, largest: float, least: float = 0.0) -
     if kind == "angle" and field.path.startswith("control["):
         return "fraction", f"{shown}, of full travel as PX4 orders it", "full_deg is the angle at full travel"
     if kind == "angle":
+        if DRAFT.least_pulse_us <= least and largest <= DRAFT.most_pulse_us:
+            doubt = "pulses of full port, neutral and full starboard, and the dead band, are usual ones"
+            return "us", shown, f"{doubt}; full_deg is the angle at full travel"
         if largest > DRAFT.most_rad:
             return "deg", f"{shown}, more than a turn in radians", ""
         return "rad", shown, "" if "rad" in words else "degrees are possible where it never turns far"

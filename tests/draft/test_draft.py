@@ -613,3 +613,12 @@ def test_a_guessed_order_that_never_changes_is_left_out(tmp_path: Path) -> None:
 def test_columns_among_which_no_actuator_is_found_are_named(tmp_path: Path) -> None:
     with pytest.raises(FerryIdError, match=r"beside pose and velocity the columns left_knob, right_knob\. Fix"):
         drafted(tmp_path, two_thrusters("left_knob", "right_knob"))
+
+
+def test_a_rudder_in_pulses_is_no_angle(tmp_path: Path) -> None:
+    columns = sailed()
+    columns["rudder"] = 1500.0 + 400.0 * columns["rudder"] / np.abs(columns["rudder"]).max()
+    rudder = next(one for quantity, one in drafted(tmp_path, columns)[1].items() if ".rudder" in quantity)
+    assert rudder.unit == "us"
+    assert rudder.sign == 1.0
+    assert any("full_deg is the angle at full travel" in one for one in rudder.doubts)
