@@ -18,6 +18,8 @@ from ferryid.vessel.signal_map import stream_name
 _SPEED = frozenset({"rpm", "rps", "speed", "n", "revs", "revolutions", "rotation", "shaft"})
 _ANGLE = frozenset({"azimuth", "azi", "angle", "alpha", "direction", "steering", "nozzle"})
 _RUDDER = frozenset({"rudder", "delta"})
+_OF_TIME = frozenset({"t", "time", "s", "sec", "ms", "us", "ns"})
+"""What makes a delta a step of time."""
 _FORCE = frozenset({"force", "thrust", "newton", "thruster"})
 _DUTY = frozenset({"pwm", "throttle", "duty", "percent"})
 BASES = (
@@ -302,6 +304,8 @@ def _split(words: Sequence[str]) -> tuple[str, ...]:
 def _role(words: Sequence[str], around: Sequence[str]) -> str:
     """Return the role of a field: by its own words, and of one that is called data, by its topic's."""
     own = [word for word in words if word not in ("data", "value", "x", "cmd", "command", "reference", "ref")]
+    if own[:1] == ["delta"] and set(own[1:]) & _OF_TIME:
+        return ""
     for said in (set(own), set(around)):
         for role, names in (
             ("duty", _DUTY),

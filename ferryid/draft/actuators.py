@@ -162,6 +162,9 @@ def _signal(
                 [
                     field.assumed,
                     doubt,
+                    f"it never changes in this log: it is always {values[0]:.4g}"
+                    if values.size and not np.ptp(values)
+                    else "",
                     *stated.doubts,
                     "" if field.order is not None or measured else UNKNOWN_ORDER,
                     "what this output of the autopilot drives: a thruster, or a rudder, which is an actuator of kind "

@@ -622,3 +622,13 @@ def test_a_rudder_in_pulses_is_no_angle(tmp_path: Path) -> None:
     assert rudder.unit == "us"
     assert rudder.sign == 1.0
     assert any("full_deg is the angle at full travel" in one for one in rudder.doubts)
+
+
+def test_a_step_of_time_is_no_rudder_and_what_never_changes_is_said_to(tmp_path: Path) -> None:
+    columns = sailed()
+    columns["delta_t"] = np.full_like(columns["t"], 0.1)
+    columns["thrust_starboard"] = np.zeros_like(columns["t"])
+    draft, signals = drafted(tmp_path, columns)
+    assert not [one for one in draft.every if "delta_t" in one.fields]
+    (thrust,) = (one for one in signals.values() if "thrust_starboard" in one.fields)
+    assert "it never changes in this log: it is always 0" in thrust.doubts
