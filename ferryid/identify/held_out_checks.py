@@ -15,17 +15,19 @@ def skill_checks(scores: ForceScores) -> tuple[Check, ...]:
     """Return whether the model predicts held-out acceleration better than a velocity that does not change.
 
     The base model may be a rigid body without damping, which any correction betters. A skill score that is not positive says
-    that the model is of no use to predict motion (Murphy 1988). Empty where errors are not those of an acceleration, as of logs
-    that are too short for windows, and of archives.
+    that the model is of no use to predict motion (Murphy 1988). The mean of the axes is geometric, so that twice the error on
+    one weighs as much as half of it on another. Empty where errors are not those of an acceleration, as of logs that are too
+    short for windows, and of archives.
     """
     still = scores.mse_constant_velocity
     known = np.isfinite(still) & np.isfinite(scores.mse_model) & (still > 0.0)
     if not known.any():
         return ()
     ratio = scores.mse_model[known] / still[known]
-    mean = float(ratio.mean())
+    with np.errstate(divide="ignore"):
+        mean = float(np.exp(np.mean(np.log(ratio))))
     axes = ", ".join(f"{AXES[axis]} {one:.2g}" for axis, one in zip(np.flatnonzero(known), ratio.tolist(), strict=True))
-    told = f"The squared prediction error is {mean:.2g} of that of a velocity that does not change (mean of the axes: {axes})"
+    told = f"The squared prediction error is {mean:.2g} of that of a velocity that does not change (geometric mean of {axes})"
     if mean < 1.0:
         told += "."
     else:

@@ -61,9 +61,10 @@ def _not_read(path: Path, untimed: Untimed, layout: TableLayout | None) -> Loss:
     wanted = (
         f'time "{layout.time}", as the profile\'s [table] names it,' if layout is not None and layout.time else "time"
     )
+    size = f"{counted(len(untimed.names), 'array')} of {counted(untimed.rows, 'row')}"
     return Loss(
         str(path),
-        f"{where} has {counted(len(untimed.names), 'array')} of {untimed.rows} rows without a {wanted} of as many rows "
+        f"{where} has {size} without a {wanted} of as many rows "
         f"({names}). Fix: save the time beside them, or leave them out of what is saved if they are no signals",
         messages=untimed.rows,
     )

@@ -18,10 +18,11 @@ Key = tuple[str, str | None]
 
 @dataclass(frozen=True)
 class BaseAndModel(Record):
-    """Mean square force errors of a base model and of a model [N², N², N²m²]."""
+    """Mean square errors of a base model, of a model, and of a constant velocity where it is known [N², N², N²m²]."""
 
     base: ByAxis
     model: ByAxis
+    constant_velocity: ByAxis | None = None
 
 
 @dataclass(frozen=True)

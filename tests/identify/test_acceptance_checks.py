@@ -195,12 +195,14 @@ def test_a_model_is_held_against_a_velocity_that_does_not_change() -> None:
 
     (good,) = judged(1.0, 4.0, 1.6)
     assert good.passed
-    assert good.value == pytest.approx((0.5 + 0.5 + 0.625) / 3)
-    (bad,) = judged(1.0, 1.0, 1.0)
+    assert good.value == pytest.approx((0.5 * 0.5 * 0.625) ** (1 / 3))
+    (bad,) = judged(1.0, 1.0, 0.5)
     assert bad.passed is False
     assert (
-        "is 1.2 of that of a velocity that does not change (mean of the axes: surge 0.5, sway 2, yaw 1)" in bad.reason
+        "is 1.3 of that of a velocity that does not change (geometric mean of surge 0.5, sway 2, yaw 2)" in bad.reason
     )
+    (even,) = judged(1.0, 1.0, 1.0)
+    assert even.value == pytest.approx(1.0), "half of one is as much as twice of another"
     (without_sway,) = judged(1.0, np.nan, 2.0)
     assert without_sway.value == pytest.approx(0.5)
     assert judged(np.nan, np.nan, np.nan) == ()
