@@ -22,8 +22,10 @@ def along(force_model: ForceModel | Measurements, k: int) -> Floats:
     measurements = force_model if isinstance(force_model, Measurements) else force_model.measurements
     actuator, part = measurements.profile.actuators[k], force_model.parts[:, k]
     if actuator.kind == "azimuth":
-        angle = force_model.angles[:, k]
-        return np.asarray(part[:, 0] * np.cos(angle) + part[:, 1] * np.sin(angle))
+        # Most models leave the angles as they were measured.
+        angle, known = force_model.angles, measurements.angles is force_model.angles
+        cosine, sine = measurements.directions if known else (np.cos(angle), np.sin(angle))
+        return np.asarray(part[:, 0] * cosine[:, k] + part[:, 1] * sine[:, k])
     return np.asarray(part[:, 0] * math.cos(actuator.angle_rad) + part[:, 1] * math.sin(actuator.angle_rad))
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ferryid.cached import cached_property
 from ferryid.counts import counted
-from ferryid.effects.equations_of_motion import accelerations, from_antenna, required, slopes
+from ferryid.effects.equations_of_motion import accelerations, along_vessel, from_antenna, required, slopes
 from ferryid.effects.wind_loads import shape_of, steady_wind_force, weighed_loads
 from ferryid.types import Floats, Ints
 from ferryid.vessel.hull import payload_mass
@@ -116,6 +116,11 @@ class Measurements:
         return np.cos(self.psi), np.sin(self.psi)
 
     @cached_property
+    def directions(self) -> tuple[Floats, Floats]:
+        """Cosine and sine of the measured angles of azimuth thrusters, shape (n, k) each."""
+        return np.cos(self.angles), np.sin(self.angles)
+
+    @cached_property
     def wind_loads(self) -> dict[tuple[bytes, float], Floats]:
         """Loads that were worked out already, by what tells them apart; see `ferryid.effects.wind.mean_load`."""
         return {}
@@ -195,15 +200,16 @@ def hull_of(profile: Profile) -> Floats:
     return np.array([*mass, *(D.get(name, 0.0) for name in COEFFICIENTS[5:])], dtype=np.float64)
 
 
-def body_current(force_model: ForceModel) -> tuple[Floats, Floats]:
-    """Return the water's velocity over ground along the vessel's x and y axes [m/s], shape (n,) each."""
-    flow, measurements = force_model.flow, force_model.measurements
-    if flow is None:
-        still = np.zeros(len(measurements.t))
-        return still, still
-    cosine, sine = measurements.pointing
-    north, east = flow.T
-    return cosine * north + sine * east, cosine * east - sine * north
+def flow_along_vessel(force_model: ForceModel) -> Floats:
+    """Return the water's velocity over ground along the vessel's x and y axes [m/s], shape (n, 2); no rows for still water."""
+    if force_model.flow is None:
+        return _NO_FLOW
+    # Compiled code does not look where an array ends.
+    if force_model.flow.shape != (len(force_model.measurements.t), 2):
+        raise ValueError(
+            f"{counted(len(force_model.flow), 'row')} of flow, {len(force_model.measurements.t)} of motion"
+        )
+    return along_vessel(np.ascontiguousarray(force_model.flow), *force_model.measurements.pointing)
 
 
 def acceleration(force_model: ForceModel) -> Floats:
@@ -284,7 +290,7 @@ def required_force(force_model: ForceModel, nu_dot: Floats) -> Floats:
 def _forces(force_model: ForceModel) -> tuple[Floats, Floats, Floats, Floats]:
     """Return external forces, flow along the vessel's axes, load, and factor on damping, for the equations of motion."""
     n = len(force_model.measurements.t)
-    flow = _NO_FLOW if force_model.flow is None else np.column_stack(body_current(force_model))
+    flow = flow_along_vessel(force_model)
     load = _NO_LOAD if force_model.load is None else force_model.load
     factor = _NO_FACTOR if force_model.damping_factor is None else force_model.damping_factor
     # Compiled code does not look where an array ends.
@@ -353,21 +359,26 @@ def between(
 
     `impulse` is a momentum by row, as of `ferryid.effects.effect.Effect`; that of the first row of the onset acts there.
     """
-    rows = (before.measurements.t >= onset_s) & (before.measurements.t < offset_s)
-    if impulse is not None and rows.any() and not rows[0]:
-        external, first = after.external.copy(), int(np.argmax(rows))
+    first, end = np.searchsorted(before.measurements.t, (onset_s, offset_s)).tolist()
+    if impulse is not None and 0 < first < end:
+        external = after.external.copy()
         external[first] += impulse[first] / before.measurements.step_s
         after = replace(after, external=external)
 
     def mixed(old: Floats, new: Floats) -> Floats:
-        return new if old is new else np.where(rows.reshape(-1, *[1] * (old.ndim - 1)), new, old)
+        if old is new:
+            return new
+        made = old.copy()
+        made[first:end] = new[first:end]
+        return made
 
     def either(old: Floats | None, new: Floats | None, blank: float = 0.0) -> Floats | None:
         known = new if old is None else old
-        if known is None:
-            return None
-        nothing = np.full_like(known, blank)
-        return mixed(nothing if old is None else old, nothing if new is None else new)
+        if known is None or old is new:
+            return new
+        made = np.full(known.shape, blank) if old is None else old.copy()
+        made[first:end] = blank if new is None else new[first:end]
+        return made
 
     return replace(
         after,

@@ -32,8 +32,12 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Add the spring's pull on the body origin."""
     measurements = force_model.measurements
-    X, Y = to_body(-p[0] * (measurements.eta[:, 0] - p[2]), -p[1] * (measurements.eta[:, 1] - p[3]), measurements.psi)
-    return replace(force_model, external=force_model.external + np.column_stack([X, Y, np.zeros_like(X)]))
+    cosine, sine = measurements.pointing
+    north, east = -p[0] * (measurements.eta[:, 0] - p[2]), -p[1] * (measurements.eta[:, 1] - p[3])
+    external = force_model.external.copy()
+    external[:, 0] += cosine * north + sine * east
+    external[:, 1] += cosine * east - sine * north
+    return replace(force_model, external=external)
 
 
 def load(

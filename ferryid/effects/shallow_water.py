@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.compiled import borrowing, compiled
 from ferryid.effects.effect import Choice, Effect, Parameter, Residual, Values
 from ferryid.effects.force_model import ForceModel, Measurements, added_mass
 from ferryid.effects.hull_spread import hull_model_spread
@@ -43,22 +44,31 @@ def _side(name: str, at: float, size: float, reach: float = 1.0) -> Parameter:
     return Parameter(name, "m", size, at - reach * size, at + reach * size, neutral=at)
 
 
-def _share(outside: Floats) -> Floats:
-    s = 1.0 - np.clip(outside / EDGE_M, 0.0, 1.0)
-    return np.asarray(s * s * (3.0 - 2.0 * s))
+@borrowing
+def _share(outside: float) -> float:
+    s = 1.0 - min(max(outside / EDGE_M, 0.0), 1.0)
+    return s * s * (3.0 - 2.0 * s)
+
+
+@compiled
+def _inside(eta: Floats, south: float, north: float, west: float, east: float) -> Floats:
+    out = np.empty(eta.shape[0])
+    for i in range(eta.shape[0]):
+        x, y = eta[i, 0], eta[i, 1]
+        out[i] = _share(south - x) * _share(x - north) * _share(west - y) * _share(y - east)
+    return out
 
 
 def inside(measurements: Measurements, sides: Floats) -> Floats:
     """Return how much of the factor acts in every row, 0 to 1, shape (n,)."""
-    x, y = measurements.eta[:, 0], measurements.eta[:, 1]
-    south, north, west, east = sides.tolist()
-    return _share(south - x) * _share(x - north) * _share(west - y) * _share(y - east)
+    return _inside(np.ascontiguousarray(measurements.eta), *sides.tolist())
 
 
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Multiply the damping in the place, and let the added mass grow."""
     growth = (float(p[0]) - 1.0) * inside(force_model.measurements, p[1:5])
-    return force_model.damped(1.0 + growth).with_load(float(p[5]) * growth[:, None] * added_mass(force_model))
+    load = np.multiply.outer(growth, float(p[5]) * added_mass(force_model))
+    return force_model.damped(1.0 + growth).with_load(load)
 
 
 def choose(force_model: ForceModel, prior_hull: Floats, residual: Residual) -> Choice:

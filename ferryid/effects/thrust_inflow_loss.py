@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from ferryid.compiled import compiled
 from ferryid.effects.effect import Effect, Parameter, Values
-from ferryid.effects.force_model import ForceModel, Measurements, body_current
+from ferryid.effects.equations_of_motion import relative
+from ferryid.effects.force_model import ForceModel, Measurements, flow_along_vessel
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
@@ -22,16 +25,23 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Take ``k V_a`` off each force, V_a the velocity of the thruster through the water along its own push."""
     measurements = force_model.measurements
-    u_c, v_c = body_current(force_model)
-    u, v, r = measurements.nu.T
-    parts = force_model.parts.copy()
-    for k, actuator in enumerate(measurements.profile.actuators):
-        x, y = actuator.position_m
-        X, Y = force_model.parts[:, k, 0], force_model.parts[:, k, 1]
-        size = np.hypot(X, Y)
-        along = (X * (u - u_c - r * y) + Y * (v - v_c + r * x)) / np.where(size > 0.0, size, 1.0)
-        parts[:, k] *= (1.0 - np.clip(p[0] * along, -1.0, 1.0))[:, None]
-    return replace(force_model, parts=parts)
+    places = np.array([one.position_m for one in measurements.profile.actuators]).reshape(-1, 2)
+    parts, nu = map(np.ascontiguousarray, (force_model.parts, measurements.nu))
+    return replace(force_model, parts=_with_loss(parts, nu, flow_along_vessel(force_model), places, float(p[0])))
+
+
+@compiled
+def _with_loss(parts: Floats, nu: Floats, flow: Floats, places: Floats, per_mps: float) -> Floats:
+    out = np.empty_like(parts)
+    for i in range(parts.shape[0]):
+        u, v, r = relative(i, nu, flow)
+        for k in range(parts.shape[1]):
+            X, Y = parts[i, k, 0], parts[i, k, 1]
+            size = math.sqrt(X * X + Y * Y)
+            along = (X * (u - r * places[k, 1]) + Y * (v + r * places[k, 0])) / (size if size > 0.0 else 1.0)
+            left = 1.0 - min(max(per_mps * along, -1.0), 1.0)
+            out[i, k, 0], out[i, k, 1], out[i, k, 2] = left * X, left * Y, left * parts[i, k, 2]
+    return out
 
 
 def cannot(measurements: Measurements) -> str:

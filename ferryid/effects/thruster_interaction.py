@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
-from math import hypot
 from typing import Any
 
 import numpy as np
 
+from ferryid.compiled import compiled
+from ferryid.effects.actuator_force import along
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import ForceModel, Measurements
 from ferryid.effects.thresholds import EFFECTS
@@ -15,8 +17,8 @@ from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
 from ferryid.vessel.thrusters import thrust
 
-SHARPNESS = 16
-"""Power of the cosine of the angle beside the wake: half of the loss is left at 17 degrees."""
+SQUARINGS = 4
+"""How often the cosine of the angle beside the wake is squared: of its power of 16 half of the loss is left at 17 degrees."""
 
 
 def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
@@ -27,40 +29,43 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Take the loss off, which grows with the root of the force behind the wake as a jet's speed does."""
     actuators = force_model.measurements.profile.actuators
-    parts = force_model.parts.copy()
-    size = np.hypot(force_model.parts[:, :, 0], force_model.parts[:, :, 1])
-    pushes = [np.sqrt(np.minimum(size[:, j] / _full(force_model, j, size[:, j]), 1.0)) for j in range(len(actuators))]
-    for i, hit in enumerate(actuators):
-        for j, source in enumerate(actuators):
-            dx, dy = hit.position_m[0] - source.position_m[0], hit.position_m[1] - source.position_m[1]
-            apart = hypot(dx, dy)
-            if i == j or apart == 0.0:
-                continue
-            push = force_model.parts[:, j]
-            towards = -(push[:, 0] * dx + push[:, 1] * dy) / (np.maximum(size[:, j], 1e-9) * apart)
-            parts[:, i] *= (1.0 - p[0] * _in_wake(towards) * pushes[j])[:, None]
-    return replace(force_model, parts=parts)
+    places = np.array([one.position_m for one in actuators]).reshape(-1, 2)
+    most = np.column_stack([_full(force_model, j) for j in range(len(actuators))])
+    parts = np.ascontiguousarray(force_model.parts)
+    return replace(force_model, parts=_with_loss(parts, places, most, float(p[0])))
 
 
-def _in_wake(towards: Floats) -> Floats:
-    """Return the cosine of the angle beside the wake to the power of `SHARPNESS`, by squaring: a twentieth of the time."""
-    power = np.maximum(towards, 0.0)
-    for _ in range(SHARPNESS.bit_length() - 1):
-        power *= power
-    return power
+@compiled
+def _with_loss(parts: Floats, places: Floats, most: Floats, fraction: float) -> Floats:
+    out = parts.copy()
+    for i in range(parts.shape[0]):
+        for j in range(parts.shape[1]):
+            X, Y = parts[i, j, 0], parts[i, j, 1]
+            size = max(math.sqrt(X * X + Y * Y), 1e-9)
+            push = math.sqrt(min(size / most[i, j], 1.0))
+            for k in range(parts.shape[1]):
+                dx, dy = places[k, 0] - places[j, 0], places[k, 1] - places[j, 1]
+                apart = math.sqrt(dx * dx + dy * dy)
+                if apart > 0.0:
+                    wake = max(-(X * dx + Y * dy) / (size * apart), 0.0)
+                    # By squaring: a twentieth of the time.
+                    for _ in range(SQUARINGS):
+                        wake *= wake
+                    left = 1.0 - fraction * wake * push
+                    out[i, k, 0] *= left
+                    out[i, k, 1] *= left
+                    out[i, k, 2] *= left
+    return out
 
 
-def _full(force_model: ForceModel, j: int, size: Floats) -> Floats:
+def _full(force_model: ForceModel, j: int) -> Floats:
     """Return the most that a thruster can push, ahead or astern as it does [N], shape (n,); the log's most without a curve."""
-    actuator = force_model.measurements.profile.actuators[j]
-    most = np.full(len(size), max(float(size.max()), 1e-9))
+    actuator, n = force_model.measurements.profile.actuators[j], len(force_model.parts)
     if actuator.thrust is None or actuator.thrust.kind == "open_water":
-        return most
-    angle = force_model.angles[:, j] if actuator.kind == "azimuth" else np.full(len(size), actuator.angle_rad)
-    along = force_model.parts[:, j, 0] * np.cos(angle) + force_model.parts[:, j, 1] * np.sin(angle)
+        return np.full(n, max(float(np.hypot(force_model.parts[:, j, 0], force_model.parts[:, j, 1]).max()), 1e-9))
     factor = 60.0 if actuator.thrust.input_unit == "rps" else 1.0
-    astern, ahead = thrust(actuator.thrust, factor * np.array(actuator.thrust.valid))[0] * actuator.count
-    return np.asarray(np.maximum(np.abs(np.where(along < 0.0, astern, ahead)), 1e-9))
+    astern, ahead = np.maximum(np.abs(thrust(actuator.thrust, factor * np.array(actuator.thrust.valid))[0]), 1e-9)
+    return np.asarray(actuator.count * np.where(along(force_model, j) < 0.0, astern, ahead))
 
 
 def cannot(measurements: Measurements) -> str:

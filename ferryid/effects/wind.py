@@ -69,8 +69,8 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
     measurements = force_model.measurements
     if measurements.profile.wind is None:
         return force_model
-    air, factors = np.split(np.asarray(p, dtype=np.float64), [2], axis=-1)
-    factors = factors if factors.size else np.ones(3)
+    p = np.asarray(p, dtype=np.float64)
+    air, factors = p[..., :2], p[..., 2:] if p.shape[-1] > 2 else np.ones(3)
     external = mean_load(measurements, air, force_model.gust_std) - measurements.air_load
     external *= factors
     external += force_model.external

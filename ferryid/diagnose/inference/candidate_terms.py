@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ferryid.effects.force_model import ForceModel, Measurements, body_current
+from ferryid.effects.force_model import ForceModel, Measurements, flow_along_vessel
 from ferryid.types import AXES, Floats
 from ferryid.vessel.frames import to_body
 
@@ -81,9 +81,9 @@ def terms_of(measurements: Measurements) -> tuple[Term, ...]:
 
 def through_water(force_model: ForceModel) -> tuple[Floats, Floats, Floats]:
     """Return the velocity through the water [m/s, m/s, rad/s], shape (n,) each."""
-    u_c, v_c = body_current(force_model)
+    flow = flow_along_vessel(force_model)
     u, v, r = force_model.measurements.nu.T
-    return u - u_c, v - v_c, r
+    return (u - flow[:, 0], v - flow[:, 1], r) if len(flow) else (u, v, r)
 
 
 def _motions() -> list[tuple[str, str, Quantity]]:

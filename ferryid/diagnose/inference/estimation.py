@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from math import inf, log
 
 import numpy as np
@@ -148,13 +149,17 @@ class EstimationProblem:
         Coefficients that cannot move have none.
         """
         free = np.flatnonzero(self.hull_spread)
-        every = np.zeros((self.steps.measured[:, self.steps.channels].size, len(self.hull_spread)))
-        if free.size:
-            moves = HULL_DIFFERENCE * self.hull_spread[free]
-            every[:, free] = self.whitening_filter.white(
-                self.steps.hull_changes(force_model, free, moves) / HULL_DIFFERENCE
-            )
+        every = np.zeros((self.steps.measured_channels.size, len(self.hull_spread)))
+        every[:, free] = self.slopes_of(force_model, free)
         return every
+
+    def slopes_of(self, force_model: ForceModel, places: Ints) -> Floats:
+        """Return `hull_slopes` by some of the coefficients that can move, shape (w, k)."""
+        if not places.size:
+            return np.empty((self.steps.measured_channels.size, 0))
+        changes = self.steps.hull_changes(force_model, places, HULL_DIFFERENCE * self.hull_spread[places])
+        changes /= HULL_DIFFERENCE
+        return self.whitening_filter.white(changes)
 
     def white(self, force_model: ForceModel) -> Floats:
         """Return the whitened prediction errors of a force model, flat."""
@@ -233,7 +238,8 @@ def fit(
     neutral = np.array([parameter.neutral for parameter in every])
     low = (np.array([parameter.low for parameter in every]) - neutral) / size
     high = (np.array([parameter.high for parameter in every]) - neutral) / size
-    cuts = np.cumsum([len(candidate.parameters) for candidate in candidates])[:-1].tolist()
+    ends = np.cumsum([0, *(len(candidate.parameters) for candidate in candidates)]).tolist()
+    own = [slice(first, end) for first, end in pairwise(ends)]
     q, h = len(every), len(problem.hull_spread)
     # Where an effect changes masses or damping itself, what the hull's coefficients do depends on it.
     bends = any(candidate.effect.changes_hull for candidate in candidates)
@@ -245,9 +251,9 @@ def fit(
         return extended([replace(problem.plain, hull=problem.plain.hull + problem.hull_spread * z[:h])], z)
 
     def extended(chain: list[ForceModel], z: Floats) -> list[ForceModel]:
-        values = np.split(neutral + size * z[h:], cuts) if every else []
+        values = neutral + size * z[h:]
         for i in order[len(chain) - 1 :]:
-            chain.append(candidates[i].act(chain[-1], values[i]))
+            chain.append(candidates[i].act(chain[-1], values[own[i]]))
         return chain
 
     def white(chain: Sequence[ForceModel]) -> Floats:
@@ -281,7 +287,7 @@ def fit(
     products = np.empty((len(both), len(both)))
     for count in range(max(steps, 1)):
         if count > 0 and (bends or count % HULL_SLOPE_ITERATIONS == 0):
-            by_hull, fresh = problem.hull_slopes(chain[-1])[:, moving], True
+            by_hull, fresh = problem.slopes_of(chain[-1], moving), True
             of_hull = by_hull.T @ by_hull
         by_effects = np.empty((len(w), 0))
         if free.size:
@@ -304,12 +310,12 @@ def fit(
         slope, gained = z.copy(), 0.0
         slope[both] += np.concatenate([by_hull.T @ w, by_effects.T @ w])
         whole = newton_step(A, slope, lowest, highest)
-        if least > -inf:
-            # The score test: what the linearisation promises, and a multiple of it as the most that there may be.
-            promised = -float(2.0 * slope @ whole + whole @ A @ whole)
-            if evidence_of(cost - promised * INFERENCE.linearisation_factor, A) < least:
-                break
-        for damping in DAMPINGS:
+        promised = -float(2.0 * slope @ whole + whole @ A @ whole)
+        # The score test: what the linearisation promises, and a multiple of it as the most that there may be.
+        if least > -inf and evidence_of(cost - promised * INFERENCE.linearisation_factor, A) < least:
+            break
+        # Where less is promised than a fit has converged by, no shorter step is worth its trial.
+        for damping in DAMPINGS if promised > CONVERGED_GAIN else DAMPINGS[:1]:
             # Levenberg's and Marquardt's way, where the whole step leads astray.
             step = whole
             if damping > 0.0:
@@ -327,12 +333,12 @@ def fit(
         if gained < CONVERGED_GAIN:
             if fresh or steps <= HULL_SLOPE_ITERATIONS:
                 break
-            by_hull, fresh = problem.hull_slopes(chain[-1])[:, moving], True
+            by_hull, fresh = problem.slopes_of(chain[-1], moving), True
             of_hull = by_hull.T @ by_hull
     covariance = np.asarray(np.linalg.inv(A)[h:, h:] * np.outer(size, size), dtype=np.float64)
-    values = tuple(np.split(neutral + size * z[h:], cuts)) if every else ()
+    fitted = neutral + size * z[h:]
     hull = problem.plain.hull + problem.hull_spread * z[:h]
-    return Fit(tuple(candidates), values, covariance, hull, evidence_of(cost, A))
+    return Fit(tuple(candidates), tuple(fitted[one] for one in own), covariance, hull, evidence_of(cost, A))
 
 
 def effect_slopes(problem: EstimationProblem, kept: Fit) -> Floats:
