@@ -81,25 +81,16 @@ def general_warnings(settings: FitSettings, known: Excitation, scores: ModelScor
 def _axis_warnings(scores: ModelScores) -> list[str]:
     """Say on which axes the model predicts no motion, or explains no force."""
     force, warnings = scores.force, []
-    for axis, unit, share, ratio, error, none in zip(
-        AXES,
-        ("N", "N", "N·m"),
-        force.r2_model.tolist(),
-        force.ratio.tolist(),
-        np.sqrt(force.mse_model).tolist(),
-        np.sqrt(force.mse_constant_velocity).tolist(),
-        strict=True,
-    ):
-        more = " The base model, with which the verdict compares, errs more still." if ratio < 1.0 else ""
-        if error > none:
+    useless = force.skill_warnings
+    errors = np.sqrt(force.mse_model), np.sqrt(force.mse_constant_velocity)
+    for k, axis in enumerate(AXES):
+        more = " The base model, with which the verdict compares, errs more still." if force.ratio[k] < 1.0 else ""
+        if axis in useless:
+            warnings.append(f"{useless[axis]}{more}")
+        elif force.r2_model[k] < 0.0 and not errors[0][k] <= errors[1][k]:
             warnings.append(
-                f"In {axis} the model predicts acceleration worse than a velocity that does not change (rms error {error:.3g} "
-                f"against {none:.3g} {unit}). Do not rely on the model there.{more}"
-            )
-        elif np.isfinite(share) and share < 0.0 and not error <= none:
-            warnings.append(
-                f"In {axis} the model explains the measured force worse than its mean does (R² {share:.2f}): hardly any force "
-                f"varies there, or something else moves the vessel. Do not rely on the model there.{more}"
+                f"In {axis} the model explains the measured force worse than its mean does (R² {force.r2_model[k]:.2f}): "
+                f"hardly any force varies there, or something else moves the vessel. Do not rely on the model there.{more}"
             )
     return warnings
 

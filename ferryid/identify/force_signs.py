@@ -17,6 +17,7 @@ from ferryid.identify.motion_data import LogData
 from ferryid.identify.split import Split
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.weak_data import WeakData, weak_data
+from ferryid.log_warnings import log_warnings
 from ferryid.models.forces import ACCELERATIONS
 from ferryid.regression import CrossProducts
 from ferryid.types import AXES, Flags, Floats, Ints
@@ -144,7 +145,10 @@ def refuse_reversed_forces(data: LogData) -> str:
     profile = data.profile
     told = wrong_way(found.reversed, found.spread, f"the profile {profile.name}", *signs_of(profile))
     if told:
-        raise ReversedForcesError(f"{data.where}: {told}")
+        doubts = log_warnings([(one.recording.name, one.doubts) for one in data.prepared])
+        # What contradicts itself in the log may be why.
+        beside = f". Mind first: {' '.join(doubts).removesuffix('.')}" if doubts else ""
+        raise ReversedForcesError(f"{data.where}: {told}{beside}")
     return _undecided(found, profile)
 
 

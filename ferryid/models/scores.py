@@ -49,6 +49,17 @@ class ForceScores:
         known = ratio[np.isfinite(ratio)]
         return cls(mse_base, mse_model, r2[0], r2[1], ratio, float(known.mean()) if known.size else math.nan)
 
+    @property
+    def skill_warnings(self) -> dict[str, str]:
+        """Sentences on the axes on which the model errs more than a velocity that does not change, by axis."""
+        roots = zip(AXES, np.sqrt(self.mse_model).tolist(), np.sqrt(self.mse_constant_velocity).tolist(), strict=True)
+        return {
+            axis: f"In {axis} the model predicts acceleration worse than a velocity that does not change (rms error "
+            f"{error:.3g} against {none:.3g} {'N·m' if axis == 'yaw' else 'N'}). Do not rely on the model there."
+            for axis, error, none in roots
+            if error > none
+        }
+
     def without_sway(self) -> ForceScores:
         """Return the scores where sway was not measured: NaN there, and the mean of the other axes."""
         known = np.array([1.0, np.nan, 1.0])

@@ -20,7 +20,7 @@ def rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
 
 def never_seen(diagnosis: Diagnosis) -> list[str]:
     """Return the effects that a log would not have shown at any size, whatever the thruster."""
-    return list(dict.fromkeys(one.effect.replace("_", " ") for one in diagnosis.least_sizes if one.value is None))
+    return list(dict.fromkeys(_name(one) for one in diagnosis.least_sizes if one.value is None))
 
 
 def line(diagnosis: Diagnosis) -> str:
@@ -53,8 +53,15 @@ def proof(diagnosis: Diagnosis) -> str:
     return f"ferryid prove --real {recording} --vessel {vessel} --only {','.join(wanted)}"
 
 
+def _name(one: LeastSize) -> str:
+    """Return the title of an effect as it stands within a sentence."""
+    known = effects().get(one.effect)
+    title = known.title if known else one.effect.replace("_", " ")
+    return title[:1].lower() + title[1:]
+
+
 def _short(one: LeastSize) -> str:
-    name = one.effect.replace("_", " ")
+    name = _name(one)
     return f"{name} at any size" if one.value is None else f"{name} below {one.text}"
 
 

@@ -88,6 +88,18 @@ def test_a_reversed_moment_is_named(opened: Opened, seconds: float) -> None:
             )
 
 
+def test_a_refusal_says_what_else_is_wrong_with_the_log(opened: Opened) -> None:
+    data = data_of(opened, turned(measured(1, seconds=240.0, jitter=0.03, noise=20.0)))
+    with pytest.raises(FerryIdError, match=r"the yaw moment accelerates .*heading and yaw rate$"):
+        refuse_reversed_forces(data)
+    off = (
+        "The vessel moves 176 deg to starboard of its heading, at all headings alike: if it moved ahead, add +176 deg."
+    )
+    doubted = tuple(replace(one, doubts=(off,)) for one in data.prepared)
+    with pytest.raises(FerryIdError, match=r"yaw rate\. Mind first: .*: The vessel moves 176 deg .*add \+176 deg$"):
+        refuse_reversed_forces(replace(data, prepared=doubted))
+
+
 @pytest.mark.slow
 def test_a_response_has_the_truth_in_its_interval(opened: Opened) -> None:
     off = []

@@ -297,8 +297,8 @@ def test_what_no_size_would_have_shown_stands_in_the_verdict() -> None:
     seen = LeastSize("heading_bias", None, 1.0, "deg", "")
     told = headline(replace(diagnosis("matched"), least_sizes=(*unseen, seen)))
     assert told == (
-        "Matched as far as this log can show, which is not all: nothing is found missing from the model, but wind, current, "
-        "payload and 1 more would not have been seen at any size."
+        "Matched as far as this log can show, which is not all: nothing is found missing from the model, but steady wind, "
+        "current, payload and 1 more would not have been seen at any size."
     )
     assert headline(replace(diagnosis("matched"), least_sizes=(seen,))).startswith("Matched: nothing")
 

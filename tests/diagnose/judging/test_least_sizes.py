@@ -85,8 +85,8 @@ def test_a_terminal_has_a_line_on_the_largest_of_several_thrusters() -> None:
     assert shown.line(made) == ""
     made = replace(made, least_sizes=sizes)
     assert shown.line(made) == (
-        "would not have been seen here: wind below 1.1 m/s, thruster gain at any size, other0 below 12 %, other1 below 12 %, "
-        "other2 below 12 % (and 2 effects more in the report)"
+        "would not have been seen here: steady wind below 1.1 m/s, thruster force at any size, other0 below 12 %, other1 below "
+        "12 %, other2 below 12 % (and 2 effects more in the report)"
     )
     assert shown.proof(made) == "ferryid prove --real log.bag --vessel boat --only wind"
     own = replace(made, path="sea trial/log.bag", profile="boats/vessel.toml")
