@@ -51,6 +51,28 @@ def test_the_command_line_counts_before_a_file(ferryid, log: Path, tmp_path: Pat
     assert not (log.parent / "results").exists()
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (
+            ("--json", "--out", "here"),
+            "--json: a value must follow it, and --out is another option. Fix: give --json a file",
+        ),
+        (("--vessel", "--no-report"), "--vessel: a value must follow it, and --no-report is another option."),
+    ],
+)
+def test_an_option_is_no_value_of_the_one_before_it(ferryid, log: Path, words: tuple[str, ...], said: str) -> None:
+    before = sorted(log.parent.iterdir())
+    run = ferryid("fit", log, *words)
+    assert run.code == 2
+    assert said in run.err
+    assert sorted(log.parent.iterdir()) == before
+
+
+def test_a_value_that_looks_like_an_option_may_be_given_with_a_sign_of_equality(ferryid, log: Path) -> None:
+    assert "no vessel profile of this name" in ferryid("fit", log, "--vessel=--out").err
+
+
 def test_an_end_of_ranges_is_no_version_and_no_form(ferryid, log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     put(log, "to = 60\n")
     monkeypatch.chdir(log.parent)
