@@ -82,6 +82,8 @@ class Sampled:
         Processor time of all of its threads and processes [s].
     looks, looks_s
         How often it was looked at, and what that took [s].
+    loops_s
+        Of its time, what the main thread spent within compiled loops [s].
     """
 
     took_s: float
@@ -91,6 +93,7 @@ class Sampled:
     processor_s: float
     looks: int
     looks_s: float
+    loops_s: float
 
     def where(self, what: str) -> str:
         """Return where the time went, as sentences; `what` is the command."""
@@ -99,11 +102,14 @@ class Sampled:
         most = sorted(self.functions.items(), key=lambda one: -one[1])[:SHOWN]
         names = ", ".join(f"`{name}` {took / self.took_s:.0%}" for name, took in most)
         cores, rest_s = os.cpu_count() or 1, max(self.took_s - sum(shown.values()), 0.0)
+        loops = ""
+        if self.loops_s >= LEAST_SHARE * self.took_s:
+            loops = f" Compiled loops alone keep the main thread for {duration(self.loops_s)}."
         return (
             f"Where the {duration(self.took_s)} of {what} go, by {self.looks} looks at the main thread, which took "
             f"{duration(self.looks_s)}: {parts}, the rest {duration(rest_s)}. All of its threads and processes take "
             f"{duration(self.processor_s)} of processor time: with {cores} cores busy throughout it would take "
-            f"{duration(self.processor_s / cores)}. By function, with what it calls outside ferryid: {names}."
+            f"{duration(self.processor_s / cores)}.{loops} By function, with what it calls outside ferryid: {names}."
         )
 
 
@@ -129,7 +135,7 @@ def sampled_process(
     found = json.loads(next(line for line in errors.splitlines() if line.startswith("sampled ")).partition(" ")[2])
     by_step = {"starting and ending Python": max(took - found["seen_s"], 0.0)}
     by_step |= {step: found["steps"][step] for step in (*sampled.LOADING, *steps) if step in found["steps"]}
-    more = (found[name] for name in ("functions", "processor_s", "looks", "looks_s"))
+    more = (found[name] for name in ("functions", "processor_s", "looks", "looks_s", "loops_s"))
     return Sampled(took, much, by_step, *more)
 
 

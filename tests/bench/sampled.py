@@ -26,6 +26,8 @@ LOADING = {
 }
 """Steps of every command, as `begin` takes them."""
 REST = "the rest"
+LOOPS = f"{os.sep}ferryid{os.sep}compiled.py"
+"""Where compiled loops are called."""
 
 
 def begin(steps: Mapping[str, Sequence[str]], interval_s: float) -> Callable[[], None]:
@@ -44,7 +46,7 @@ def begin(steps: Mapping[str, Sequence[str]], interval_s: float) -> Callable[[],
     own = f"{os.sep}ferryid{os.sep}"
     step_of, took, functions = dict[CodeType, str](), Counter[str](), Counter[str]()
     start = last = time.perf_counter()
-    looks, looks_s = 0, 0.0
+    looks, looks_s, loops_s = 0, 0.0, 0.0
 
     def step(code: CodeType) -> str:
         if code not in step_of:
@@ -54,8 +56,10 @@ def begin(steps: Mapping[str, Sequence[str]], interval_s: float) -> Callable[[],
         return step_of[code]
 
     def look(_signal: int, frame: FrameType | None) -> None:
-        nonlocal last, looks, looks_s
+        nonlocal last, looks, looks_s, loops_s
         now = time.perf_counter()
+        if frame is not None and frame.f_code.co_filename.endswith(LOOPS):
+            loops_s += now - last
         found, function = REST, ""
         while frame is not None:
             code = frame.f_code
@@ -78,7 +82,13 @@ def begin(steps: Mapping[str, Sequence[str]], interval_s: float) -> Callable[[],
         seen_s = time.perf_counter() - start
         # Threads and processes that have ended count, and what the kernel did for them.
         processor = os.times()
-        made = {"seen_s": seen_s, "processor_s": sum(processor[:4]), "looks": looks, "looks_s": looks_s}
+        made = {
+            "seen_s": seen_s,
+            "processor_s": sum(processor[:4]),
+            "looks": looks,
+            "looks_s": looks_s,
+            "loops_s": loops_s,
+        }
         made |= {"steps": took, "functions": functions}
         print(f"sampled {json.dumps(made)}", file=sys.stderr, flush=True)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -143,10 +144,12 @@ def test_every_step_is_a_function_that_there_is() -> None:
 
 def test_steps_that_take_little_are_of_the_rest() -> None:
     steps = {"reading": 6.0, "writing": 0.05, "judging": 3.0}
-    run = Sampled(10.0, 10**9, steps, {"a.py:b": 5.0, "c.py:d": 1.0}, 16.0, 1000, 0.02)
+    run = Sampled(10.0, 10**9, steps, {"a.py:b": 5.0, "c.py:d": 1.0}, 16.0, 1000, 0.02, 3.0)
     said = run.where("a campaign")
     assert "Where the 10 s of a campaign go, by 1000 looks at the main thread, which took 20 ms: " in said
     assert "reading 6 s, judging 3 s, the rest 1 s. " in said
+    assert "Compiled loops alone keep the main thread for 3 s." in said
+    assert "Compiled" not in replace(run, loops_s=0.01).where("a campaign")
     assert "`a.py:b` 50%, `c.py:d` 10%" in said
 
 
