@@ -23,25 +23,29 @@ class OtherHeading:
     """A heading that a vessel did not have, psi [rad], shape (n,)."""
 
     psi: Floats
-    _last: list[tuple[Measurements, Measurements]] = field(default_factory=list, repr=False)
+    _last: list[tuple[Measurements, Measurements, Floats, Floats]] = field(default_factory=list, repr=False)
 
-    def of(self, measurements: Measurements) -> Measurements:
-        """Return the measurements with this heading; those asked for last are kept, with the loads that were worked out."""
+    def of(self, measurements: Measurements) -> tuple[Measurements, Floats, Floats]:
+        """Return the measurements with this heading, and cosine and sine of the angle from it to theirs, shape (n,) each.
+
+        Those asked for last are kept, with the loads that were worked out.
+        """
         last = self._last[0] if self._last else None
         if last is None or last[0] is not measurements:
-            last = measurements, replace(measurements, eta=np.column_stack([measurements.eta[:, :2], self.psi]))
+            other = replace(measurements, eta=np.column_stack([measurements.eta[:, :2], self.psi]))
+            apart = measurements.psi - self.psi
+            last = measurements, other, np.cos(apart), np.sin(apart)
             # A list at once: threads share it.
             self._last[:] = [last]
-        return last[1]
+        return last[1:]
 
     def acted(self, act: Callable[[ForceModel], ForceModel], force_model: ForceModel) -> ForceModel:
         """Return a force model in which something acts as if the vessel had had this heading."""
-        measurements = force_model.measurements
-        acted = act(replace(force_model, measurements=self.of(measurements)))
+        other, cos, sin = self.of(force_model.measurements)
+        acted = act(replace(force_model, measurements=other))
         if acted.flow is force_model.flow or acted.flow is None:
             return replace(force_model, external=acted.external)
         # Water that meets the other heading from where it would have met this one.
-        cos, sin = np.cos(measurements.psi - self.psi), np.sin(measurements.psi - self.psi)
         north, east = acted.flow.T
         flow = np.column_stack([cos * north - sin * east, sin * north + cos * east])
         return replace(force_model, external=acted.external, flow=flow)
