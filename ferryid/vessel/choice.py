@@ -190,7 +190,11 @@ def _fitting(logs: Sequence[str]) -> VesselChoice:
         what = "this log has" if len(logs) == 1 else "these logs have"
         if len(most) < len(logs):
             what = f"{len(most)} of {counted(len(logs), 'log')} have"
-        return VesselChoice(profile, shared[0], _line(profile, f"{kind}, the only profile whose signals {what}"))
+        why = f"{kind}, the only profile whose signals {what}"
+        if profile.table is not None and profile.table.columns:
+            # Any table of as many columns has them.
+            why += f", by the places of {counted(len(profile.table.columns), 'column')}: make sure that it is this vessel's"
+        return VesselChoice(profile, shared[0], _line(profile, why))
     if len(most) == len(logs):
         for (log, matches), names in zip(every, fitting, strict=True):
             if not names:

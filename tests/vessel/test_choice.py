@@ -45,6 +45,16 @@ def test_the_only_profile_that_fits(log: Path) -> None:
     assert choice.reason == "vessel milliampere: bundled, the only profile whose signals this log has"
 
 
+def test_columns_without_names_say_that_they_are_chosen_by_their_places(tmp_path: Path) -> None:
+    rows = [" ".join(f"{0.05 * k + place:.3f}" for place in range(12)) for k in range(60)]
+    log = tmp_path / "towed.dat"
+    log.write_text("\n".join(["a", "b", "c", "d", *rows, ""]), encoding="utf-8")
+    assert choose_vessel([log]).reason == (
+        "vessel kvlcc2-model: bundled, the only profile whose signals this log has, by the places of 12 columns: make sure "
+        "that it is this vessel's"
+    )
+
+
 def test_a_log_that_no_profile_fits_does_not_decide_for_most_that_have_one(log: Path) -> None:
     second = Path(shutil.copy(log, log.parent / "b.mcap"))
     foreign = log.parent / "foreign.csv"
