@@ -23,6 +23,8 @@ METADATA = "metadata.yaml"
 _LIKE_LOG = ("logs", "path", "paths", "file", "files", "filename", "bag", "recording")
 LARGEST_BYTES = 64 << 20
 """Of a manifest; a million paths are less."""
+LONGEST_LINE = 1 << 16
+"""Bytes of the first line of a table that are compared."""
 
 
 @dataclass(frozen=True)
@@ -134,7 +136,7 @@ def _entries(one: str, vessel: str | None, tell: Callable[[str], None]) -> Itera
 
 
 def _tell_of_parts(path: Path, tell: Callable[[str], None]) -> None:
-    """Tell that the recordings in a folder are parts of one, as everywhere, and how each is a log of its own."""
+    """Tell that the recordings or tables in a folder are of one log, as everywhere, and how each is a log of its own."""
     if not _exists(path) or not path.is_dir() or (path / METADATA).is_file():
         return
     parts = sum(file.name.endswith(log_suffixes(parts=True)) for file in path.iterdir())
@@ -143,6 +145,21 @@ def _tell_of_parts(path: Path, tell: Callable[[str], None]) -> None:
             f"{path}: its {parts} recordings are taken as parts of one log; if each is a log of its own, name them: "
             f'"{path}/*"'
         )
+    tables = sorted(path.glob("*.csv"))
+    if len(tables) > 1 and len({_first_line(table) for table in tables}) == 1:
+        tell(
+            f"{path}: its {len(tables)} tables of the same columns are taken as topics of one log; if each is a log of its "
+            f'own, name them: "{path}/*.csv"'
+        )
+
+
+def _first_line(path: Path) -> bytes:
+    """Return the line of a table that names its columns, no more than the beginning of it."""
+    try:
+        with path.open("rb") as file:
+            return file.readline(LONGEST_LINE)
+    except OSError:  # whoever reads the log says what is wrong with it
+        return b""
 
 
 def _logs(one: str) -> list[str]:

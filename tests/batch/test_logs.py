@@ -54,6 +54,22 @@ def test_recordings_in_a_folder_are_parts_of_one_and_that_is_told(season: Path) 
     assert len(told) == 1
 
 
+def test_tables_of_the_same_columns_in_a_folder_are_topics_of_one_and_that_is_told(season: Path) -> None:
+    told: list[str] = []
+    for name, columns in (("a", "t,u,v"), ("b", "t,u,v"), ("c", "t,u,v")):
+        (season / "sub" / f"{name}.csv").write_text(f"{columns}\n0,1,2\n", encoding="utf-8")
+    for recording in (season / "sub").glob("*.mcap"):
+        recording.unlink()
+    assert [one.log for one in entries_of(["season/sub"], "x", told.append)] == ["season/sub"]
+    assert told == [
+        "season/sub: its 3 tables of the same columns are taken as topics of one log; if each is a log of its own, name them: "
+        '"season/sub/*.csv"'
+    ]
+    (season / "sub" / "c.csv").write_text("t,rudder\n0,1\n", encoding="utf-8")
+    entries_of(["season/sub", "season/sub/*.csv"], "x", told.append)
+    assert len(told) == 1
+
+
 def test_a_log_that_is_asked_for_twice_is_one(season: Path) -> None:
     assert named("season/*.mcap", season / "b.mcap", "season/../season/a.mcap") == named("season/*.mcap")
 
