@@ -52,6 +52,11 @@ ALL_THRUSTERS = "all"
 """Instance of a change of force that all actuators have in common, as by a weak battery."""
 
 
+def uncapitalised(text: str) -> str:
+    """Return a title or sentence as it goes on within another."""
+    return text[:1].lower() + text[1:]
+
+
 def titled(title: str, instance: str | None) -> str:
     """Return a title with the thruster it is one of, if it is, or that it is of all of them."""
     if instance == ALL_THRUSTERS:

@@ -7,7 +7,7 @@ from typing import Any
 from ferryid.counts import counted
 from ferryid.diagnose.judging import Key, Likeness, likeness_as_json, separation
 from ferryid.effects import effects
-from ferryid.effects.wording import listed, titled
+from ferryid.effects.wording import listed, titled, uncapitalised
 from ferryid.identifiability.sensors import SENSORS
 from ferryid.identifiability.study import Assessment, Study
 
@@ -98,8 +98,7 @@ def _line(likeness: Likeness, key: Key) -> str:
 
 def _title(key: Key) -> str:
     effect, instance = key
-    title = titled(effects()[effect].title, instance)
-    return title[:1].lower() + title[1:]
+    return uncapitalised(titled(effects()[effect].title, instance))
 
 
 def _named(key: Key) -> dict[str, str | None]:

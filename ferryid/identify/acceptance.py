@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.effects.wording import uncapitalised
 from ferryid.errors import FerryIdError
 from ferryid.identify.settings import WITHOUT_SWAY
 from ferryid.identify.thresholds import IDENTIFY
@@ -70,7 +71,7 @@ class Acceptance:
 
     def with_checks(self, checks: Sequence[Check]) -> Acceptance:
         """Return the verdict under the full criterion: that of the held-out error and of all these checks."""
-        failed = [f"Rejected: {_lower(check.reason)}" for check in checks if check.passed is False]
+        failed = [f"Rejected: {uncapitalised(check.reason)}" for check in checks if check.passed is False]
         obstacles = sum(reason.startswith("Rejected:") for reason in self.reasons)
         notes = [check.reason for check in checks if check.passed is None]
         return Acceptance(
@@ -181,11 +182,6 @@ def _error_on_axis(axis: str, base: float, model: float, measure: str) -> Check:
 def _change(ratio: float) -> str:
     """Return a ratio as a signed change in per cent."""
     return f"{100.0 * (ratio - 1.0):+.1f} %"
-
-
-def _lower(sentence: str) -> str:
-    """Return a sentence as it goes on after a colon."""
-    return sentence[:1].lower() + sentence[1:]
 
 
 def force_mse(

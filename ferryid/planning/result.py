@@ -8,7 +8,7 @@ from typing import Any
 from ferryid.counts import counted
 from ferryid.diagnose.judging import Key
 from ferryid.effects import effects
-from ferryid.effects.wording import listed, titled
+from ferryid.effects.wording import listed, titled, uncapitalised
 from ferryid.planning.plan import Expected, Plan, Separated, Track
 
 SCHEMA = "ferryid.plan/1"
@@ -143,8 +143,7 @@ def _size(size: float | None) -> str:
 
 
 def _title(key: Key) -> str:
-    title = titled(effects()[key[0]].title, key[1])
-    return title[:1].lower() + title[1:]
+    return uncapitalised(titled(effects()[key[0]].title, key[1]))
 
 
 def _clock(seconds: float) -> str:

@@ -8,6 +8,7 @@ from pathlib import PurePath
 
 from ferryid.counts import counted
 from ferryid.diagnose import JUDGING, UNKNOWN, Estimate
+from ferryid.effects.wording import uncapitalised
 from ferryid.report.batch_rows import FindingSummary, SummaryRow
 from ferryid.report.diagnosis_words import sized, title
 
@@ -46,8 +47,7 @@ def _named(some: Sequence[FindingSummary]) -> str:
 
 
 def _name(one: FindingSummary) -> str:
-    name = title(one.effect, one.instance)
-    return name[:1].lower() + name[1:]
+    return uncapitalised(title(one.effect, one.instance))
 
 
 def sized_name(first: FindingSummary) -> str:

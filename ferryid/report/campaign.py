@@ -11,7 +11,7 @@ import numpy as np
 
 from ferryid.counts import counted
 from ferryid.diagnose import UNKNOWN, Diagnosis, Estimate, Finding, Withheld
-from ferryid.effects.wording import listed
+from ferryid.effects.wording import listed, uncapitalised
 from ferryid.report import diagnosis_words, second_sources
 from ferryid.report.diagnosis_errors import fitted, ratio_of
 from ferryid.report.drawings import NONE, Drawings
@@ -226,8 +226,7 @@ def names_of(diagnosis: Diagnosis, common: Sequence[Finding] = ()) -> str:
 def _inline(finding: Finding) -> str:
     if finding.effect == UNKNOWN:
         return "something without a name"
-    name = diagnosis_words.title(finding.effect, finding.instance)
-    return name[:1].lower() + name[1:]
+    return uncapitalised(diagnosis_words.title(finding.effect, finding.instance))
 
 
 def _short(name: str) -> str:

@@ -11,7 +11,7 @@ from ferryid.counts import counted
 from ferryid.diagnose import JUDGING, UNKNOWN, Diagnosis, Estimate, Finding, worse_axes
 from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS
-from ferryid.effects.wording import listed, parameter_word, timed, titled
+from ferryid.effects.wording import listed, parameter_word, timed, titled, uncapitalised
 from ferryid.report import least_sizes
 from ferryid.report.diagnosis_errors import fitted, ratio_of
 from ferryid.types import AXES
@@ -81,10 +81,10 @@ def headline(diagnosis: Diagnosis) -> str:
     """Return the verdict in one sentence."""
     every = [one for one in diagnosis.findings if one.effect != UNKNOWN]
     named = [one for one in every if one.sure]
-    doubtful = listed([_inline(title(one.effect, one.instance)) for one in every if one not in named])
+    doubtful = listed([uncapitalised(title(one.effect, one.instance)) for one in every if one not in named])
     physics = [_sure_name(one) for one in named if one.effect in effects()]
     faulty = [one for one in named if _of_sensor(one)]
-    sensors = _faults(faulty, [_inline(title(one.effect)) for one in faulty])
+    sensors = _faults(faulty, [uncapitalised(title(one.effect)) for one in faulty])
     base = "simulation" if diagnosis.against else "model"
     left_out = "the recording differs from the simulation in" if diagnosis.against else "the model left out"
     parts = [f"{left_out} {listed(physics)}"] if physics else []
@@ -293,7 +293,7 @@ def rivals(finding: Finding) -> list[str]:
     """Return what else was considered, and what would tell it apart."""
     lines = []
     if finding.unresolved_with:
-        names = listed([_inline(one) for name in finding.unresolved_with for one in _meant(finding, name)], "or")
+        names = listed([uncapitalised(one) for name in finding.unresolved_with for one in _meant(finding, name)], "or")
         lines.append(f"These data cannot distinguish it from {names}.")
     # Another shape of the same thrust curve may be unresolved though the evidence is clear.
     alike = [
@@ -306,15 +306,15 @@ def rivals(finding: Finding) -> list[str]:
         and known.of_thrust_curve
     ]
     if alike:
-        shapes = listed([_inline(title(one.effect, one.instance)) for one in alike])
+        shapes = listed([uncapitalised(title(one.effect, one.instance)) for one in alike])
         lines.append(
             f"The evidence is against {shapes}, but that explains nearly as much, and formulas of thrust are idealised."
         )
     shown = sorted((one for one in finding.rivals if one not in alike), key=lambda rival: -rival.delta_score)[:RIVALS]
     near = [one for one in shown if one.delta_score > -log(FAR)]
-    far = [_inline(title(one.effect, one.instance)) for one in shown if one not in near]
+    far = [uncapitalised(title(one.effect, one.instance)) for one in shown if one not in near]
     if near:
-        parts = [f"{_inline(title(one.effect, one.instance))} {_odds(one.delta_score)}" for one in near]
+        parts = [f"{uncapitalised(title(one.effect, one.instance))} {_odds(one.delta_score)}" for one in near]
         lines.append(f"Of the other effects that were tried in its place, {'; '.join(parts)}.")
     if far:
         other = "Any other" if near else "Any other effect that was tried in its place"
@@ -330,7 +330,7 @@ def _sure_name(finding: Finding, *, sizes: bool = True) -> str:
     first, *others = _called(finding)
     if sizes:
         first = sized(first, finding.effect, finding.parameters)
-    return listed([_inline(one) for one in (first, *others)], "or")
+    return listed([uncapitalised(one) for one in (first, *others)], "or")
 
 
 def sized(name: str, effect: str, parameters: Mapping[str, Estimate]) -> str:
@@ -417,8 +417,8 @@ def summary(diagnoses: Sequence[Diagnosis]) -> str:
     faulty = [one for one in named if one.sure and _of_sensor(one)]
     sensors = _faults(faulty, [_sure_name(one, sizes=False) for one in faulty])
     unrecorded = sum(any(one.sure and one.effect == UNRECORDED for one in each.findings) for each in diagnoses)
-    doubtful = dict.fromkeys(_inline(title(one.effect, one.instance)) for one in named if not one.sure)
-    known = {_inline(name) for one in named if one.sure for name in _called(one)}
+    doubtful = dict.fromkeys(uncapitalised(title(one.effect, one.instance)) for one in named if not one.sure)
+    known = {uncapitalised(name) for one in named if one.sure for name in _called(one)}
     perhaps = [one for one in doubtful if one not in known]
     parts = [f"Of {counted(len(diagnoses), 'log')}, {listed(counts)}."]
     if sure:
@@ -447,7 +447,7 @@ def about_errors(diagnosis: Diagnosis) -> list[str]:
     """Return what a reader of the table of force errors must know: what they are of, and what is not in them."""
     lines = []
     if diagnosis.findings:
-        unsteady = [_inline(title(one.effect)) for one in diagnosis.findings if one.effect in UNSTEADY]
+        unsteady = [uncapitalised(title(one.effect)) for one in diagnosis.findings if one.effect in UNSTEADY]
         absent = [
             *unsteady,
             *(["unexplained forces"] if any(one.effect == UNKNOWN for one in diagnosis.findings) else []),
@@ -532,10 +532,6 @@ def _odds(delta: float) -> str:
 def word(name: str) -> str:
     """Return the name of a parameter for people."""
     return name if name in COEFFICIENTS else parameter_word(name)
-
-
-def _inline(name: str) -> str:
-    return name[:1].lower() + name[1:]
 
 
 def _upper(text: str) -> str:

@@ -8,6 +8,7 @@ from shlex import quote
 from ferryid.counts import counted
 from ferryid.diagnose.judging import Diagnosis, LeastSize
 from ferryid.effects import effects
+from ferryid.effects.wording import uncapitalised
 
 SHOWN = 5
 """Effects on a terminal: the page and the JSON have all."""
@@ -56,8 +57,7 @@ def proof(diagnosis: Diagnosis) -> str:
 def _name(one: LeastSize) -> str:
     """Return the title of an effect as it stands within a sentence."""
     known = effects().get(one.effect)
-    title = known.title if known else one.effect.replace("_", " ")
-    return title[:1].lower() + title[1:]
+    return uncapitalised(known.title if known else one.effect.replace("_", " "))
 
 
 def _short(one: LeastSize) -> str:

@@ -6,7 +6,7 @@ from typing import Any
 
 from ferryid.counts import counted
 from ferryid.diagnose import Likeness, Pair, separation
-from ferryid.effects.wording import listed
+from ferryid.effects.wording import listed, uncapitalised
 from ferryid.report.drawings import NONE, Drawings
 from ferryid.report.figures import MEASURED, WIDTH, margins, styled, svg_text
 from ferryid.report.heat_map import HeatCell, HeatMap
@@ -71,7 +71,7 @@ def heat_cells(likeness: Likeness) -> HeatMap:
             return HeatCell(fill, f"{size}{'' if one.visible else ', too little to be named'}.")
         pair = pairs.get(frozenset((one.key, effects[j].key)))
         apart = "" if pair is None else f" Distinguished {_from(pair)}."
-        says = f"{one.title} and {_inline(effects[j].title)}: likeness {_number(value)}.{apart}"
+        says = f"{one.title} and {uncapitalised(effects[j].title)}: likeness {_number(value)}.{apart}"
         text = f"{min(value, 0.99):.2f}".lstrip("0") if value >= WRITTEN else ""
         return HeatCell(fill, says, text, on_dark=value > DARK)
 
@@ -139,7 +139,7 @@ def sentences(likeness: Likeness, where: str) -> list[str]:
         if apart:
             lines.append(f"{counted(len(apart), 'pair').capitalize()} cannot be distinguished at the usual size.")
     if likeness.hidden:
-        names = listed([_inline(one.title) for one in likeness.hidden])
+        names = listed([uncapitalised(one.title) for one in likeness.hidden])
         lines.append(f"Too small at their usual size to be named here: {names}.")
     return lines
 
@@ -156,7 +156,7 @@ def notes(likeness: Likeness | None, where: str) -> list[str]:
 
 def names(likeness: Likeness, pair: Pair) -> str:
     """Return the titles of two effects."""
-    return f"{_inline(likeness.title(pair.first))} and {_inline(likeness.title(pair.second))}"
+    return f"{uncapitalised(likeness.title(pair.first))} and {uncapitalised(likeness.title(pair.second))}"
 
 
 def resolved(pair: Pair) -> str:
@@ -194,10 +194,6 @@ def _from(pair: Pair) -> str:
     return (
         f"{'' if pair.resolved_from is None else 'from '}{resolved(pair)}{'' if pair.resolved_from is None else ' on'}"
     )
-
-
-def _inline(title: str) -> str:
-    return title[:1].lower() + title[1:]
 
 
 def _size(value: float) -> str:

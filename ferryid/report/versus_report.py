@@ -8,9 +8,10 @@ from typing import Any
 
 from ferryid.counts import counted
 from ferryid.diagnose import GROUPS, JUDGING, DiagnosisSettings, Difference, Versus, compare_groups, versus_json
-from ferryid.effects.wording import listed
+from ferryid.effects.wording import listed, uncapitalised
 from ferryid.errors import FerryIdError
 from ferryid.files import finite
+from ferryid.report.diagnosis_words import title
 from ferryid.report.folder import PAGE, made, write_folder
 from ferryid.report.html import template
 from ferryid.report.interactive import STATIC, Interactive, make_interactive
@@ -94,7 +95,7 @@ def unresolved(one: Difference) -> str:
     """Return what a difference cannot be separated from, and the manoeuvre that would; empty where there is none."""
     if not one.unresolved_with:
         return ""
-    names = " and ".join(each.replace("_", " ") for each in one.unresolved_with)
+    names = " and ".join(uncapitalised(title(each)) for each in one.unresolved_with)
     within = f"within {JUDGING.unresolved_evidence:g} nat"
     return f"Not separable from {names}, {within}; what separates them: {one.separating_manoeuvre}."
 
