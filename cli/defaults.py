@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import pairwise
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from typer.core import TyperCommand
 
 from ferryid.cli.plain_values import PlainValues
-from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.errors import did_you_mean
 
 if TYPE_CHECKING:
     from ferryid.vessel.folder_settings import FolderSettings
@@ -31,9 +30,8 @@ class DefaultsCommand(PlainValues, TyperCommand):
     """A command whose options take their defaults from the nearest ``ferryid.toml``."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Keep the words of the command line; an option is no value of the one before it."""
+        """Keep the words of the command line."""
         ctx.meta.setdefault(_WORDS, list(args))
-        _refuse_missing_values(self.params, args)
         return super().parse_args(ctx, args)
 
     def invoke(self, ctx: Any) -> Any:
@@ -60,27 +58,6 @@ class DefaultsCommand(PlainValues, TyperCommand):
 
 
 _WORDS = "ferryid.words"
-
-
-def _refuse_missing_values(params: Sequence[Any], args: Sequence[str]) -> None:
-    """Refuse an option whose value was forgotten: the parser would take the next option for it, and that one's value for a log.
-
-    Raises
-    ------
-    FerryIdError
-        With both options.
-    """
-    options = [param for param in params if param.param_type_name == "option"]
-    every = {name for param in options for name in (*param.opts, *param.secondary_opts)}
-    taking = {name: param for param in options for name in param.opts if not param.is_flag}
-    for word, following in pairwise(args):
-        if word == "--":
-            return
-        if word in taking and following in every:
-            value = "a file, or - for standard output" if taking[word].name == "json" else "its value"
-            raise FerryIdError(
-                f"{word}: a value must follow it, and {following} is another option. Fix: give {word} {value}"
-            )
 
 
 def _logs_of(params: Mapping[str, Any]) -> list[str]:

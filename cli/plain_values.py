@@ -15,6 +15,8 @@ from typing import Any
 
 from typer.core import TyperCommand, TyperGroup
 
+from ferryid.cli.forgotten_values import refuse_forgotten_values
+
 _INTEGER = re.compile(r"[+-]?[0-9]{1,18}")
 _NUMBER = re.compile(r"[+-]?[0-9]+(\.[0-9]*)?([eE][+-]?[0-9]{1,2})?")
 
@@ -32,6 +34,13 @@ class PlainValues:
             if make is not None and not isinstance(getattr(own, "__self__", None), _Coercion):
                 param.get_runtime_param = _Coercion(make, own, param).itself
         return params
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Refuse an option whose value was forgotten; an unfinished command line may have such."""
+        if not ctx.resilient_parsing:
+            refuse_forgotten_values(self.get_params(ctx), args)
+        words: list[str] = super().parse_args(ctx, args)  # type: ignore[misc]
+        return words
 
 
 class PlainCommand(PlainValues, TyperCommand):

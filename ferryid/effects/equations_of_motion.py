@@ -314,7 +314,7 @@ def to_ground(values: Floats, cosine: Floats, sine: Floats) -> None:
 @compiled
 def along_vessel(values: Floats, cosine: Floats, sine: Floats) -> Floats:
     """Return vectors to north and east, shape (n, 2), along the vessel's axes; cosine and sine of the heading."""
-    out = np.empty_like(values)
+    out = np.empty(values.shape)
     for i in range(values.shape[0]):
         c, s, north, east = cosine[i], sine[i], values[i, 0], values[i, 1]
         out[i, 0], out[i, 1] = c * north + s * east, c * east - s * north

@@ -204,12 +204,26 @@ def flow_along_vessel(force_model: ForceModel) -> Floats:
     """Return the water's velocity over ground along the vessel's x and y axes [m/s], shape (n, 2); no rows for still water."""
     if force_model.flow is None:
         return _NO_FLOW
-    # Compiled code does not look where an array ends.
-    if force_model.flow.shape != (len(force_model.measurements.t), 2):
-        raise ValueError(
-            f"{counted(len(force_model.flow), 'row')} of flow, {len(force_model.measurements.t)} of motion"
-        )
-    return along_vessel(np.ascontiguousarray(force_model.flow), *force_model.measurements.pointing)
+    check_rows(force_model)
+    return along_vessel(np.ascontiguousarray(force_model.flow, dtype=np.float64), *force_model.measurements.pointing)
+
+
+def check_rows(force_model: ForceModel) -> None:
+    """Refuse a force model whose parts have other rows than its motion: compiled code does not look where an array ends.
+
+    Raises
+    ------
+    ValueError
+        With the lengths that differ.
+    """
+    measurements = force_model.measurements
+    n = len(measurements.t)
+    rows = {len(one) for one in (measurements.eta, measurements.nu, force_model.parts, force_model.external)}
+    rows |= {len(one) for one in (force_model.flow, force_model.load, force_model.damping_factor) if one is not None}
+    if rows != {n} or measurements.nu.shape[1:] != (3,) or force_model.parts.shape[2:] != (3,):
+        raise ValueError(f"a force model of {counted(n, 'row')} has parts of other lengths: {sorted(rows - {n})}")
+    if force_model.parts.shape[1] < (known := len(measurements.profile.actuators)):
+        raise ValueError(f"a force model has forces of {force_model.parts.shape[1]} of {counted(known, 'actuator')}")
 
 
 def acceleration(force_model: ForceModel) -> Floats:
@@ -289,14 +303,10 @@ def required_force(force_model: ForceModel, nu_dot: Floats) -> Floats:
 
 def _forces(force_model: ForceModel) -> tuple[Floats, Floats, Floats, Floats]:
     """Return external forces, flow along the vessel's axes, load, and factor on damping, for the equations of motion."""
-    n = len(force_model.measurements.t)
+    check_rows(force_model)
     flow = flow_along_vessel(force_model)
     load = _NO_LOAD if force_model.load is None else force_model.load
     factor = _NO_FACTOR if force_model.damping_factor is None else force_model.damping_factor
-    # Compiled code does not look where an array ends.
-    lengths = {len(one) for one in (force_model.external, flow, load, factor) if len(one)}
-    if lengths - {n} or force_model.measurements.nu.shape != (n, 3) or force_model.parts.shape[::2] != (n, 3):
-        raise ValueError(f"a force model of {counted(n, 'row')} has parts of other lengths: {sorted(lengths)}")
     external, flow, load, factor = map(np.ascontiguousarray, (force_model.external, flow, load, factor))
     return external, flow, load, factor
 

@@ -11,7 +11,7 @@ import numpy as np
 from ferryid.compiled import compiled
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.equations_of_motion import relative
-from ferryid.effects.force_model import ForceModel, Measurements, flow_along_vessel
+from ferryid.effects.force_model import ForceModel, Measurements, check_rows, flow_along_vessel
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
@@ -25,6 +25,7 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Take ``k V_a`` off each force, V_a the velocity of the thruster through the water along its own push."""
     measurements = force_model.measurements
+    check_rows(force_model)
     places = np.array([one.position_m for one in measurements.profile.actuators]).reshape(-1, 2)
     parts, nu = map(np.ascontiguousarray, (force_model.parts, measurements.nu))
     return replace(force_model, parts=_with_loss(parts, nu, flow_along_vessel(force_model), places, float(p[0])))
@@ -32,10 +33,10 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
 
 @compiled
 def _with_loss(parts: Floats, nu: Floats, flow: Floats, places: Floats, per_mps: float) -> Floats:
-    out = np.empty_like(parts)
+    out = parts.copy()
     for i in range(parts.shape[0]):
         u, v, r = relative(i, nu, flow)
-        for k in range(parts.shape[1]):
+        for k in range(places.shape[0]):
             X, Y = parts[i, k, 0], parts[i, k, 1]
             size = math.sqrt(X * X + Y * Y)
             along = (X * (u - r * places[k, 1]) + Y * (v + r * places[k, 0])) / (size if size > 0.0 else 1.0)

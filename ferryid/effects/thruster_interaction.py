@@ -11,7 +11,7 @@ import numpy as np
 from ferryid.compiled import compiled
 from ferryid.effects.actuator_force import along
 from ferryid.effects.effect import Effect, Parameter, Values
-from ferryid.effects.force_model import ForceModel, Measurements
+from ferryid.effects.force_model import ForceModel, Measurements, check_rows
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
@@ -29,8 +29,11 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Take the loss off, which grows with the root of the force behind the wake as a jet's speed does."""
     actuators = force_model.measurements.profile.actuators
+    check_rows(force_model)
     places = np.array([one.position_m for one in actuators]).reshape(-1, 2)
-    most = np.column_stack([_full(force_model, j) for j in range(len(actuators))])
+    most = np.empty((len(force_model.parts), len(actuators)))
+    for j in range(len(actuators)):
+        most[:, j] = _full(force_model, j)
     parts = np.ascontiguousarray(force_model.parts)
     return replace(force_model, parts=_with_loss(parts, places, most, float(p[0])))
 
@@ -39,11 +42,11 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
 def _with_loss(parts: Floats, places: Floats, most: Floats, fraction: float) -> Floats:
     out = parts.copy()
     for i in range(parts.shape[0]):
-        for j in range(parts.shape[1]):
+        for j in range(places.shape[0]):
             X, Y = parts[i, j, 0], parts[i, j, 1]
             size = max(math.sqrt(X * X + Y * Y), 1e-9)
             push = math.sqrt(min(size / most[i, j], 1.0))
-            for k in range(parts.shape[1]):
+            for k in range(places.shape[0]):
                 dx, dy = places[k, 0] - places[j, 0], places[k, 1] - places[j, 1]
                 apart = math.sqrt(dx * dx + dy * dy)
                 if apart > 0.0:

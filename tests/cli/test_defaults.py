@@ -59,6 +59,10 @@ def test_the_command_line_counts_before_a_file(ferryid, log: Path, tmp_path: Pat
             "--json: a value must follow it, and --out is another option. Fix: give --json a file",
         ),
         (("--vessel", "--no-report"), "--vessel: a value must follow it, and --no-report is another option."),
+        (("--vessel", "--out=here"), "--vessel: a value must follow it, and --out is another option."),
+        (("--json", "--help"), "--json: a value must follow it, and --help is another option."),
+        (("--json", "-h"), "--json: a value must follow it, and -h is another option."),
+        (("--json", "--bogus"), "--json: a value must follow it, and --bogus is another option."),
     ],
 )
 def test_an_option_is_no_value_of_the_one_before_it(ferryid, log: Path, words: tuple[str, ...], said: str) -> None:
@@ -67,6 +71,13 @@ def test_an_option_is_no_value_of_the_one_before_it(ferryid, log: Path, words: t
     assert run.code == 2
     assert said in run.err
     assert sorted(log.parent.iterdir()) == before
+
+
+def test_commands_of_a_group_refuse_it_as_well(ferryid, log: Path) -> None:
+    said = ferryid("vessel", "new", log, "--like", "--out", "x.toml").err
+    assert said.startswith(
+        "ferryid: --like: a value must follow it, and --out is another option. Fix: give --like its value"
+    )
 
 
 def test_a_value_that_looks_like_an_option_may_be_given_with_a_sign_of_equality(ferryid, log: Path) -> None:

@@ -12,7 +12,7 @@ from ferryid.effects import effects
 from ferryid.effects.actuator_force import along, curve_force, force_limits
 from ferryid.effects.force_model import ForceModel, Measurements, hull_of
 from ferryid.types import Floats
-from ferryid.vessel import parse_profile
+from ferryid.vessel import load_profile, parse_profile
 from ferryid.vessel.profile import Profile
 from ferryid.vessel.thrusters import force_at
 from tests.effects import fixed_propellers
@@ -195,3 +195,18 @@ def test_the_simulated_thruster_does_what_the_estimate_assumes(effect: str) -> N
     simulated = [hook.thrust(p, speed, force) for speed, force in zip(speeds.tolist(), plain.tolist(), strict=True)]
     # A bend of 5 % about a limit is not simulated.
     np.testing.assert_allclose(simulated, left(effect, tuple(p), speeds.tolist()), atol=2.0)
+
+
+def test_the_force_along_an_azimuth_thruster_follows_the_angle_that_an_effect_gives_it() -> None:
+    ferry = load_profile("milliampere")
+    n, angle = 3, 0.4
+    parts = np.zeros((n, 2, 3))
+    parts[:, 0] = force_at(ferry.actuators[0], np.full(n, 100.0), np.full(n, angle))
+    still = np.zeros((n, 3))
+    t = 0.1 * np.arange(n)
+    measurements = Measurements(ferry, t, still, still, still, parts, np.full((n, 2), angle), np.ones(n, dtype=bool))
+    before = ForceModel(measurements, hull_of(ferry), parts, measurements.angles, still)
+    assert along(before, 0) == pytest.approx(np.full(n, 100.0))
+    offset = effects()["azimuth_offset"].apply(before, np.array([20.0]), ferry.actuators[0].name)
+    # The force goes with the thruster, and is as large along it as before.
+    assert along(offset, 0) == pytest.approx(np.full(n, 100.0))

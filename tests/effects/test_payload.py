@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ferryid.effects import effects
-from ferryid.effects.force_model import ForceModel, hull_of
+from ferryid.effects.force_model import ForceModel, added_mass, hull_of
 from tests.diagnose.judging.test_unexplained import FERRY, sailed
 
 PAYLOAD = effects()["payload"]
@@ -32,6 +32,16 @@ def test_a_box_sinks_by_its_load_over_its_waterplane() -> None:
     assert half.damping_factor == pytest.approx(np.full(len(before.measurements.t), 1.1), rel=1e-3)
     twice = PAYLOAD.apply(loaded, np.array([610.0, 0.0, 0.5]), None)
     assert twice.damping_factor == pytest.approx(np.full(len(before.measurements.t), 1.32), rel=1e-3)
+
+
+def test_a_load_adds_its_own_mass_and_the_water_that_a_deeper_hull_moves() -> None:
+    before = force_model(0.25)
+    loaded = PAYLOAD.apply(before, np.array([610.0, 0.5, 1.0]), None)
+    more = float(loaded.damping_factor[0]) - 1.0  # type: ignore[index]
+    assert more == pytest.approx(0.2, rel=1e-3)
+    own = np.array([610.0, 610.0, 305.0, 305.0, 152.5])
+    assert loaded.load == pytest.approx(np.tile(own + more * added_mass(before), (len(before.measurements.t), 1)))
+    assert added_mass(before)[0] > 0.0
 
 
 def test_a_hull_of_unknown_draught_has_mass_and_place_only() -> None:

@@ -1,4 +1,4 @@
-"""What thrusters lose to the water's inflow and to each other's wakes, by hand."""
+"""What thrusters lose to the water's inflow and to each other's wakes, and what acts for a time, by hand."""
 
 from __future__ import annotations
 
@@ -8,11 +8,15 @@ from math import cos, radians, sin, sqrt
 import numpy as np
 import pytest
 
+from ferryid.diagnose.inference.candidate import OtherHeading
 from ferryid.effects import effects
 from ferryid.effects.actuator_force import curve_force
-from ferryid.effects.force_model import ForceModel, Measurements, between, hull_of
+from ferryid.effects.effect import Effect
+from ferryid.effects.force_model import ForceModel, Measurements, acceleration, between, hull_of
 from ferryid.types import Floats
-from ferryid.vessel import load_profile
+from ferryid.vessel import load_profile, parse_profile
+from ferryid.vessel.profile import Profile
+from tests.effects import fixed_propellers
 
 FERRY = load_profile("milliampere")
 N = 6
@@ -57,10 +61,112 @@ def test_no_more_than_all_thrust_is_lost_and_none_of_no_thrust() -> None:
     assert np.array_equal(INFLOW.apply(before, np.array([0.25]), None).parts, np.zeros((N, 2, 3)))
 
 
-def test_a_flow_of_other_rows_is_refused() -> None:
-    before = replace(pushed([(100.0, 0.0), (60.0, 0.0)], (1.0, 0.0, 0.0)), flow=np.zeros((N + 1, 2)))
-    with pytest.raises(ValueError, match="7 rows of flow, 6 of motion"):
-        INFLOW.apply(before, np.array([0.25]), None)
+def test_no_more_than_twice_the_thrust_is_gained_from_behind() -> None:
+    before = pushed([(100.0, 0.0), (50.0, 0.0)], (-9.0, 0.0, 0.0))
+    assert np.array_equal(INFLOW.apply(before, np.array([0.25]), None).parts, 2.0 * before.parts)
+
+
+def test_a_flow_in_whole_numbers_is_one_as_any_other() -> None:
+    before = replace(pushed([(100.0, 0.0), (60.0, 0.0)], (1.0, 0.0, 0.0), 0.7), flow=np.ones((N, 2), dtype=np.int64))
+    same = replace(before, flow=np.ones((N, 2)))
+    np.testing.assert_array_equal(acceleration(before), acceleration(same))
+
+
+@pytest.mark.parametrize("effect", [INFLOW, INTERACTION])
+def test_rows_that_do_not_belong_together_are_refused(effect: Effect) -> None:
+    before = pushed([(100.0, 0.0), (60.0, 0.0)], (1.0, 0.0, 0.0))
+    short = replace(before.measurements, nu=before.measurements.nu[1:])
+    turned = replace(before.measurements, eta=before.measurements.eta[1:])
+    for wrong in (
+        replace(before, flow=np.zeros((N + 1, 2))),
+        replace(before, parts=before.parts[1:]),
+        replace(before, measurements=short),
+        replace(before, measurements=turned, flow=np.zeros((N, 2))),
+        replace(before, parts=before.parts[:, :1]),
+    ):
+        with pytest.raises(ValueError, match=r"other lengths|of 2 actuators"):
+            effect.apply(wrong, np.array([0.25]), None)
+
+
+@pytest.mark.parametrize("effect", [INFLOW, INTERACTION])
+def test_a_vessel_without_actuators_loses_nothing(effect: Effect) -> None:
+    before = pushed([(100.0, 0.0), (60.0, 0.0)], (1.0, 0.0, 0.0))
+    bare = replace(before.measurements, profile=replace(FERRY, actuators=()))
+    nothing = replace(before, measurements=bare, parts=before.parts[:, :0], angles=before.angles[:, :0])
+    assert effect.apply(nothing, np.array([0.25]), None).parts.shape == (N, 0, 3)
+
+
+def two_in_line(kind: str) -> Profile:
+    """Return a vessel with two propellers on its centreline, of a curve that is weaker astern, or ordered a force."""
+    aft = load_fixed().actuators[0]
+    thrust = None if kind == "force" else aft.thrust
+    aft = replace(aft, kind=kind, position_m=(-2.0, 0.0), thrust=thrust, count=3 if kind == "propeller" else 1)
+    return replace(load_fixed(), actuators=(aft, replace(aft, name="fore", position_m=(2.0, 0.0), count=1)))
+
+
+def load_fixed() -> Profile:
+    return parse_profile(fixed_propellers.text(), "fixed")
+
+
+def in_line(profile: Profile, aft: Floats, fore: Floats) -> ForceModel:
+    parts = np.zeros((len(aft), 2, 3))
+    parts[:, 0, 0], parts[:, 1, 0] = aft, fore
+    still = np.zeros((len(aft), 3))
+    angles = np.full((len(aft), 2), np.nan)
+    t = 0.2 * np.arange(len(aft))
+    measurements = Measurements(profile, t, still, still, still, parts, angles, np.ones(len(aft), dtype=bool))
+    return ForceModel(measurements, hull_of(profile), parts, angles, still)
+
+
+def test_a_wake_is_weighed_by_the_most_of_all_units_on_the_side_to_which_they_push() -> None:
+    # Ahead 4.5e-4 and astern 3e-4 N/rpm² at 1050 rpm, three units aft and one fore: the aft one blows at the other first.
+    ahead, astern = 4.5e-4 * 1050.0**2, 3.0e-4 * 1050.0**2
+    before = in_line(two_in_line("propeller"), np.array([-0.3 * ahead, 50.0]), np.array([-20.0, 0.36 * ahead]))
+    after = INTERACTION.apply(before, np.array([0.4]), None)
+    lost_fore = 0.4 * sqrt(0.3 * ahead / (3.0 * astern))
+    lost_aft = 0.4 * sqrt(0.36)
+    np.testing.assert_allclose(after.parts[:, 1, 0], [-20.0 * (1.0 - lost_fore), 0.36 * ahead], rtol=1e-12)
+    np.testing.assert_allclose(after.parts[:, 0, 0], [-0.3 * ahead, 50.0 * (1.0 - lost_aft)], rtol=1e-12)
+
+
+def test_without_a_curve_a_wake_is_weighed_by_the_most_of_the_log() -> None:
+    before = in_line(two_in_line("force"), np.array([-9.0, -36.0]), np.array([20.0, 20.0]))
+    after = INTERACTION.apply(before, np.array([0.4]), None)
+    np.testing.assert_allclose(after.parts[:, 1, 0], [20.0 * (1.0 - 0.4 * 0.5), 20.0 * 0.6], rtol=1e-12)
+
+
+def test_a_mooring_pulls_to_its_place_whatever_the_heading() -> None:
+    heading = radians(30.0)
+    before = pushed([(0.0, 0.0), (0.0, 0.0)], (0.0, 0.0, 0.0), heading)
+    after = effects()["mooring"].apply(before, np.array([2.0, 3.0, 10.0, -20.0]), None)
+    north, east = 2.0 * 10.0, 3.0 * -20.0
+    pulled = [cos(heading) * north + sin(heading) * east, cos(heading) * east - sin(heading) * north, 0.0]
+    np.testing.assert_allclose(after.external, np.tile(pulled, (N, 1)), rtol=1e-13)
+
+
+@pytest.mark.parametrize("onset_s", [0.0, 0.4])
+@pytest.mark.parametrize("offset_s", [0.4, 5.0])
+def test_a_momentum_acts_where_something_begins_within_the_log(onset_s: float, offset_s: float) -> None:
+    before = pushed([(1.0, 0.0), (1.0, 0.0)], (0.0, 0.0, 0.0))
+    acts = 0.0 < onset_s < offset_s
+    found = between(before, replace(before), onset_s, offset_s, impulse=np.full((N, 3), 6.0)).external
+    expected = np.zeros((N, 3))
+    if acts:
+        expected[2] = 6.0 / 0.2
+    np.testing.assert_allclose(found, expected)
+    # Beyond its end nothing does.
+    late = between(before, before, 99.0, np.inf, impulse=np.full((N, 3), 6.0)).external
+    assert np.array_equal(late, before.external)
+
+
+def test_water_meets_another_heading_from_where_it_would_have_met_its_own() -> None:
+    before = pushed([(1.0, 0.0), (1.0, 0.0)], (0.5, 0.0, 0.0))
+    other = OtherHeading(np.full(N, radians(90.0)))
+    current = effects()["current"]
+    acted = other.acted(lambda one: current.act(one, np.array([1.0, 0.0]), None), before)
+    # On the heading east, water that sets north comes from starboard; on the heading north that is water that sets west.
+    assert acted.flow is not None
+    np.testing.assert_allclose(acted.flow, np.tile([0.0, -1.0], (N, 1)), atol=1e-15)
 
 
 def wake(angle_deg: float, share: float) -> ForceModel:

@@ -159,7 +159,8 @@ class EstimationProblem:
             return np.empty((self.steps.measured_channels.size, 0))
         changes = self.steps.hull_changes(force_model, places, HULL_DIFFERENCE * self.hull_spread[places])
         changes /= HULL_DIFFERENCE
-        return self.whitening_filter.white(changes)
+        # Column by column, as those of a starting point lie: products of the two are rounded alike.
+        return np.asfortranarray(self.whitening_filter.white(changes))
 
     def white(self, force_model: ForceModel) -> Floats:
         """Return the whitened prediction errors of a force model, flat."""
@@ -310,12 +311,12 @@ def fit(
         slope, gained = z.copy(), 0.0
         slope[both] += np.concatenate([by_hull.T @ w, by_effects.T @ w])
         whole = newton_step(A, slope, lowest, highest)
-        promised = -float(2.0 * slope @ whole + whole @ A @ whole)
-        # The score test: what the linearisation promises, and a multiple of it as the most that there may be.
-        if least > -inf and evidence_of(cost - promised * INFERENCE.linearisation_factor, A) < least:
-            break
-        # Where less is promised than a fit has converged by, no shorter step is worth its trial.
-        for damping in DAMPINGS if promised > CONVERGED_GAIN else DAMPINGS[:1]:
+        if least > -inf:
+            # The score test: what the linearisation promises, and a multiple of it as the most that there may be.
+            promised = -float(2.0 * slope @ whole + whole @ A @ whole)
+            if evidence_of(cost - promised * INFERENCE.linearisation_factor, A) < least:
+                break
+        for damping in DAMPINGS:
             # Levenberg's and Marquardt's way, where the whole step leads astray.
             step = whole
             if damping > 0.0:
