@@ -222,8 +222,20 @@ def check_rows(force_model: ForceModel) -> None:
     rows |= {len(one) for one in (force_model.flow, force_model.load, force_model.damping_factor) if one is not None}
     if rows != {n} or measurements.nu.shape[1:] != (3,) or force_model.parts.shape[2:] != (3,):
         raise ValueError(f"a force model of {counted(n, 'row')} has parts of other lengths: {sorted(rows - {n})}")
-    if force_model.parts.shape[1] < (known := len(measurements.profile.actuators)):
-        raise ValueError(f"a force model has forces of {force_model.parts.shape[1]} of {counted(known, 'actuator')}")
+
+
+def check_actuators(force_model: ForceModel) -> None:
+    """Refuse a force model that has not the force of every actuator, and as `check_rows`.
+
+    Raises
+    ------
+    ValueError
+        With how many it has, or the lengths that differ.
+    """
+    check_rows(force_model)
+    found, known = force_model.parts.shape[1], len(force_model.measurements.profile.actuators)
+    if found < known:
+        raise ValueError(f"a force model has forces of {found} of {counted(known, 'actuator')}")
 
 
 def acceleration(force_model: ForceModel) -> Floats:

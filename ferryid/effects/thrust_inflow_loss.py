@@ -11,7 +11,7 @@ import numpy as np
 from ferryid.compiled import compiled
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.equations_of_motion import relative
-from ferryid.effects.force_model import ForceModel, Measurements, check_rows, flow_along_vessel
+from ferryid.effects.force_model import ForceModel, Measurements, check_actuators, flow_along_vessel
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
@@ -25,7 +25,7 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Take ``k V_a`` off each force, V_a the velocity of the thruster through the water along its own push."""
     measurements = force_model.measurements
-    check_rows(force_model)
+    check_actuators(force_model)
     places = np.array([one.position_m for one in measurements.profile.actuators]).reshape(-1, 2)
     parts, nu = map(np.ascontiguousarray, (force_model.parts, measurements.nu))
     return replace(force_model, parts=_with_loss(parts, nu, flow_along_vessel(force_model), places, float(p[0])))

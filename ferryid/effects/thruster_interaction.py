@@ -11,7 +11,7 @@ import numpy as np
 from ferryid.compiled import compiled
 from ferryid.effects.actuator_force import along
 from ferryid.effects.effect import Effect, Parameter, Values
-from ferryid.effects.force_model import ForceModel, Measurements, check_rows
+from ferryid.effects.force_model import ForceModel, Measurements, check_actuators
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
@@ -29,7 +29,7 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Take the loss off, which grows with the root of the force behind the wake as a jet's speed does."""
     actuators = force_model.measurements.profile.actuators
-    check_rows(force_model)
+    check_actuators(force_model)
     places = np.array([one.position_m for one in actuators]).reshape(-1, 2)
     most = np.empty((len(force_model.parts), len(actuators)))
     for j in range(len(actuators)):
