@@ -47,8 +47,10 @@ def section(error: BaseException) -> str:
 
     One that only adds to another, such as the page on a log that was refused, is explained as the other.
     """
-    while isinstance(error.__cause__, FerryIdError) and str(error).startswith(str(error.__cause__).rstrip(".")):
-        error = error.__cause__
+    while isinstance(cause := error.__cause__, FerryIdError) and str(error).startswith(str(cause).rstrip(".")):
+        if cause is error:
+            break
+        error = cause
     name, trace = "", error.__traceback__
     while isinstance(trace, TracebackType):
         module = trace.tb_frame.f_globals.get("__name__", "")

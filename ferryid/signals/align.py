@@ -103,7 +103,9 @@ def align(recording: Recording, profile: Profile, rate_hz: float | None = None, 
         columns = resolve(profile, columns, rate)
     except FerryIdError as error:
         # What holds one row is not on the grid, and not the profile's fault.
-        raise (FerryIdError(message) if (message := single_rows(recording)) else error) from error
+        if message := single_rows(recording):
+            raise FerryIdError(message) from error
+        raise
     measured = _measured(recording.name, profile, columns, wrong)
     valid = measured & ~wrong
     if not valid.any():

@@ -12,6 +12,7 @@ from markdown.extensions.toc import slugify
 from ferryid.cli import error_pages
 from ferryid.cli.error_pages import MEMORY, OPTION, PAGE, PLACE, SECTIONS, section
 from ferryid.errors import FerryIdError
+from ferryid.vessel import load_profile
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -50,6 +51,30 @@ def test_the_last_module_of_ferryid_counts() -> None:
     assert section(caught.value) == "a-range-of-time"
     assert section(FerryIdError("never raised")) == OPTION
     assert error_pages.see(OPTION) == f" ({PAGE}#{OPTION})"
+
+
+def test_an_error_that_is_its_own_cause_has_a_section() -> None:
+    with pytest.raises(FerryIdError) as caught:
+        try:
+            raise FerryIdError("x")
+        except FerryIdError as error:
+            raise error from error
+    assert section(caught.value) == OPTION
+
+
+def test_a_log_of_which_the_profile_takes_no_velocity_is_refused_at_once(
+    ferryid, tmp_path: Path, fixtures: Path
+) -> None:
+    text = load_profile("milliampere").text
+    for name in ("position", "velocity"):
+        block = re.search(rf"^\[signals\.{name}\]\n(?:[^\[\n].*\n|\n)*", text, re.MULTILINE)
+        assert block is not None
+        text = text.replace(block.group(), "")
+    profile = tmp_path / "still.toml"
+    profile.write_text(text, encoding="utf-8")
+    run = ferryid("fit", fixtures / "short.mcap", "--vessel", profile, "--out", tmp_path / "out")
+    assert run.code == 2
+    assert "still.toml: surge and sway velocity are needed, found neither body velocity" in run.err
 
 
 @pytest.mark.parametrize(
