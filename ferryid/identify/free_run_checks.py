@@ -61,8 +61,9 @@ def _divergence(old: SingleRuns, new: SingleRuns, reference: str) -> Check:
     """Return whether no run of the new model diverges where the old one's does not."""
     lost = np.any(new.reached & np.isnan(new.errors[:, :, 2]) & ~np.isnan(old.errors[:, :, 2]), axis=1)
     count = int(lost.sum())
-    reason = f"{count} of {counted(len(lost), 'free run')} of the new model diverged where the {reference} did not" + (
-        ", and none may: do not simulate with it." if count else "."
+    reason = (
+        f"In {count} of {counted(len(lost), 'free run')} the new model had diverged at a horizon at which the "
+        f"{reference} had not" + (", and none may: do not simulate with it." if count else ".")
     )
     return Check("divergence", count == 0, float(count), 0.0, "runs", reason)
 

@@ -27,13 +27,16 @@ def skill_checks(scores: ForceScores) -> tuple[Check, ...]:
     with np.errstate(divide="ignore"):
         mean = float(np.exp(np.mean(np.log(ratio))))
     axes = ", ".join(f"{AXES[axis]} {one:.2g}" for axis, one in zip(np.flatnonzero(known), ratio.tolist(), strict=True))
-    told = f"The squared prediction error is {mean:.2g} of that of a velocity that does not change (geometric mean of {axes})"
+    told = (
+        f"The squared prediction error is {mean:.2g} times that of a velocity that does not change "
+        f"(geometric mean of {axes})"
+    )
     if mean < 1.0:
         told += "."
     else:
         told += (
-            ", and less than 1 is needed: to expect no acceleration is nearer. Fix: record larger motions of the axes that err "
-            "most, or check what drives them"
+            ", and less than 1 is needed: a prediction of no acceleration at all errs less. Fix: record larger motions of "
+            "the axes that err most, or check what drives them"
         )
     return (Check("constant_velocity", mean < 1.0, mean, 1.0, "of the MSE of a constant velocity", told),)
 

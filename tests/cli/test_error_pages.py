@@ -54,12 +54,9 @@ def test_the_last_module_of_ferryid_counts() -> None:
 
 
 def test_an_error_that_is_its_own_cause_has_a_section() -> None:
-    with pytest.raises(FerryIdError) as caught:
-        try:
-            raise FerryIdError("x")
-        except FerryIdError as error:
-            raise error from error
-    assert section(caught.value) == OPTION
+    error = FerryIdError("x")
+    error.__cause__ = error
+    assert section(error) == OPTION
 
 
 def test_a_log_of_which_the_profile_takes_no_velocity_is_refused_at_once(
@@ -67,9 +64,10 @@ def test_a_log_of_which_the_profile_takes_no_velocity_is_refused_at_once(
 ) -> None:
     text = load_profile("milliampere").text
     for name in ("position", "velocity"):
-        block = re.search(rf"^\[signals\.{name}\]\n(?:[^\[\n].*\n|\n)*", text, re.MULTILINE)
-        assert block is not None
-        text = text.replace(block.group(), "")
+        text, count = re.subn(
+            rf"^(\[signals\.{name}\]\n)topic = .*$", r'\1topic = "/nowhere"\nrequired = false', text, flags=re.MULTILINE
+        )
+        assert count == 1
     profile = tmp_path / "still.toml"
     profile.write_text(text, encoding="utf-8")
     run = ferryid("fit", fixtures / "short.mcap", "--vessel", profile, "--out", tmp_path / "out")

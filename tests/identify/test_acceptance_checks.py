@@ -199,7 +199,8 @@ def test_a_model_is_held_against_a_velocity_that_does_not_change() -> None:
     (bad,) = judged(1.0, 1.0, 0.5)
     assert bad.passed is False
     assert (
-        "is 1.3 of that of a velocity that does not change (geometric mean of surge 0.5, sway 2, yaw 2)" in bad.reason
+        "is 1.3 times that of a velocity that does not change (geometric mean of surge 0.5, sway 2, yaw 2)"
+        in bad.reason
     )
     (even,) = judged(1.0, 1.0, 1.0)
     assert even.value == pytest.approx(1.0), "half of one is as much as twice of another"

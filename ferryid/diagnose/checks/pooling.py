@@ -293,7 +293,7 @@ def _pooled(
 def _says(lasting: Lasting, pooled: Pool, showing: int, logs: Sequence[Examined]) -> str:
     count = sum(not one.copy for one in logs)
     blind = count - len(pooled.inside) - len(pooled.apart)
-    parts = [f"{showing} of {counted(count, 'log')} show it by themselves"]
+    parts = [f"{showing} of {counted(count, 'log')} {verb(showing, 'shows')} it alone as well"]
     if pooled.apart:
         parts.append(f"{counted(len(pooled.apart), 'log')} {verb(len(pooled.apart), 'differs')} from it")
     if blind:
@@ -302,7 +302,7 @@ def _says(lasting: Lasting, pooled: Pool, showing: int, logs: Sequence[Examined]
     if pooled.scatter[scatter] > 0.0:
         unit = pooled.parameters[scatter].unit.replace("-", "")
         parts.append(f"between logs it scatters by {pooled.scatter[scatter]:.2g} {unit}".rstrip())
-    return f"{lasting.says(pooled.values)} So it is in the vessel's logs together: {', '.join(parts)}."
+    return f"{lasting.says(pooled.values)} That is estimated from all logs of the vessel together: {', '.join(parts)}."
 
 
 def _differs(check: Check, pooled: Pool, own: SensorFinding | None) -> str:

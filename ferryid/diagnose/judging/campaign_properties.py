@@ -9,7 +9,7 @@ from math import exp, inf
 
 import numpy as np
 
-from ferryid.counts import counted
+from ferryid.counts import counted, verb
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit
 from ferryid.diagnose.inference.campaign_model import Campaign
@@ -141,8 +141,8 @@ class PropertyTest:
         effect = self.candidate.effect
         says = effect.says({name: one.value for name, one in self.estimates.items()}, self.candidate.instance)
         held, logs = self.holding
-        says += f" So it is in all {counted(logs, 'log')} together, of which {held} are predicted better with it on held-out"
-        says += " stretches."
+        says += f" That is estimated from all {counted(logs, 'log')} together; on held-out stretches {held} of them"
+        says += f" {verb(held, 'is')} predicted better with it."
         if not self.confirmed:
             says += f" It is estimated, not confirmed: {self.doubt}."
         gained = np.maximum(self.improvement, 0.0)

@@ -128,7 +128,7 @@ def test_what_logs_show_that_differ_from_the_rest_is_not_what_the_rest_have() ->
     value_of |= {id(one.measurements): value for one, value in zip(again, names, strict=True)}
     pool_check(check, (), again)
     assert [[each.vessel for each in one.findings] for one in again] == [[False], [False], *[[True]] * 4]
-    assert "2 of 6 logs show it by themselves, 2 logs differ from it" in again[2].findings[0].says
+    assert "2 of 6 logs show it alone as well, 2 logs differ from it" in again[2].findings[0].says
 
 
 def test_a_scale_that_differs_from_log_to_log_is_no_instruments() -> None:
@@ -164,5 +164,5 @@ def test_one_log_alone_and_copies_of_it_are_no_campaign() -> None:
     every = [once, once, late(turning(4))]
     found = examine_together(every, [examine(one)[0] for one in every], [False, True, False])
     assert all(one.findings == found[0].findings for one in found)
-    assert "2 of 2 logs show it by themselves" in found[0].findings[0].says
+    assert "2 of 2 logs show it alone as well" in found[0].findings[0].says
     assert found[0].findings[0].parameters == together([once, every[2]])[0].findings[0].parameters
