@@ -185,10 +185,11 @@ def estimate(one: Estimate) -> str:
     """Return a value with its interval and unit, to the digits that the interval supports."""
     width, digits = one.high - one.low, digits_of(one)
     unit = "" if one.unit in ("-", "") else f" {one.unit}"
-    value = f"{one.value:.{digits}f}{unit}"
+    # What rounds to nothing has no sign.
+    value = f"{one.value:z.{digits}f}{unit}"
     if not isfinite(width) or width == 0.0:
         return value
-    return f"{value} ({one.low:.{digits}f} to {one.high:.{digits}f})"
+    return f"{value} ({one.low:z.{digits}f} to {one.high:z.{digits}f})"
 
 
 def digits_of(one: Estimate) -> int:
@@ -357,7 +358,7 @@ def _brief_size(effect: str, found: Mapping[str, Estimate]) -> str:
 
 
 def _value(value: float, digits: int, unit: str) -> str:
-    return f"{value:.{digits}f}" + ("" if unit in ("-", "") else f" {unit}")
+    return f"{value:z.{digits}f}" + ("" if unit in ("-", "") else f" {unit}")
 
 
 def _called(finding: Finding) -> list[str]:

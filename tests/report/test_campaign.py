@@ -146,6 +146,7 @@ def test_a_number_without_an_interval_is_told_once() -> None:
     assert estimate(Estimate(15.0, 15.0, 15.0, "-")) == "15"
     assert estimate(Estimate(0.25, 0.25, 0.25, "s")) == "0.250 s"
     assert estimate(Estimate(0.25, 0.2, 0.3, "s")) == "0.25 s (0.20 to 0.30)"
+    assert estimate(Estimate(-0.0002, -0.0304, 0.03, "m/s")) == "0.000 m/s (-0.030 to 0.030)"
 
 
 @pytest.mark.parametrize(
