@@ -185,6 +185,8 @@ def _share(least: float, largest: float, shown: str) -> tuple[str, str, str]:
         return "us", shown, "pulses of full astern, neutral and full ahead, and the dead band, are usual ones"
     if largest <= 1.0:
         return "fraction", shown, ""
+    if largest > DRAFT.most_percent:
+        return "%", shown, "counts of a motor driver, as they go beyond 100: full_rpm is the speed at a count of 100"
     return "%", shown, "a share of full power, or a pulse width: offset and full_rpm turn it into a speed"
 
 

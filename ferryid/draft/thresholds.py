@@ -39,6 +39,9 @@ class DraftThresholds:
         0.5, "of the variance", "a velocity of which the pose explains less is a doubt", "convention: half"
     )
     most_rad: float = threshold(6.6, "rad", "an angle that goes beyond is in degrees", "derived: 2π and 5 % of it")
+    most_percent: float = threshold(
+        105.0, "%", "an order that goes beyond is no share of full power", "derived: 100 % and 5 % of it"
+    )
     least_pulse_us: float = threshold(
         700.0,
         "us",

@@ -100,6 +100,12 @@ def _full_key(signal: MappedSignal) -> str:
     return {"speed": "full_rpm", "angle": "full_deg", "rudder": "full_deg"}.get(role, "")
 
 
+def _full(signal: MappedSignal, key: str) -> tuple[str, str]:
+    """Return the meaning of such a key and an example; a count beyond 100 is taken as a share of 100 all the same."""
+    what, hint = _FULL[key]
+    return (re.sub("full (power|travel)", "a value of 100", what) if signal.unit == "%" else what), hint
+
+
 def open_lines(text: str) -> int:
     """Return how many lines of a drafted profile a person has to complete."""
     return sum(line.startswith(MARK) for line in text.splitlines())
@@ -201,7 +207,7 @@ def questions(draft: Draft) -> list[Question]:
         for signal in one.signals:
             key = _full_key(signal)
             if key and not any(question.key == f"{one.name}.{key}" for question in asked):
-                what, hint = _FULL[key]
+                what, hint = _full(signal, key)
                 asked.append(Question(f"{one.name}.{key}", f"{one.name}: {what}", hint))
     return asked
 
@@ -426,7 +432,7 @@ def _signal(signal: MappedSignal, answers: Answers) -> list[str]:
             "pulse_us = [1100, 1500, 1900]    # full astern, neutral, full ahead; dead_band_us = ... beside neutral"
         )
     if key := _full_key(signal):
-        what, hint = _FULL[key]
+        what, hint = _full(signal, key)
         lines.append(_entry(answers, f"{signal.quantity.partition('.')[0]}.{key}", key, hint, what))
     if signal.full_deg:
         lines.append(f"full_deg = {signal.full_deg:g}")

@@ -632,3 +632,16 @@ def test_a_step_of_time_is_no_rudder_and_what_never_changes_is_said_to(tmp_path:
     assert not [one for one in draft.every if "delta_t" in one.fields]
     (thrust,) = (one for one in signals.values() if "thrust_starboard" in one.fields)
     assert "it never changes in this log: it is always 0" in thrust.doubts
+
+
+@pytest.mark.parametrize(("most", "counts"), [(95.0, False), (500.0, True)])
+def test_counts_beyond_a_hundred_are_said_to_be_no_per_cent(tmp_path: Path, most: float, counts: bool) -> None:
+    columns = two_thrusters("PWM port", "PWM stbd")
+    for name in ("PWM port", "PWM stbd"):
+        columns[name] *= most / np.abs(columns[name]).max()
+    draft, signals = drafted(tmp_path, columns)
+    orders = [one for quantity, one in signals.items() if ".speed" in quantity]
+    assert [one.unit for one in orders] == ["%", "%"]
+    assert [any("counts of a motor driver" in doubt for doubt in one.doubts) for one in orders] == [counts, counts]
+    # What the profile divides by is 100 in either case.
+    assert draft_text(draft, Answers("boat")).count("# speed at a value of 100 [rpm]") == 2
