@@ -87,7 +87,7 @@ def test_a_weak_thruster_is_found_over_all_logs(cut: bool) -> None:
     assert found.gain.low > 0.0
     said = {claim.finding.says for path in places for claim in judged.claims(path)}
     assert len(said) == 1
-    assert f"in all {len(places)} logs together" in said.pop()
+    assert f"from all {len(places)} logs together" in said.pop()
 
 
 def test_a_sound_vessel_has_no_property() -> None:
