@@ -197,6 +197,9 @@ class Effect:
         Where ``of_log`` names parameters, it takes them for each row as well, shape (n, p).
     of_sensor
         True where it corrects what was measured: such effects act first, as the others act on what is true.
+    acts_last
+        True where it reads and changes neither the actuators' forces nor the water's flow, and so may act after all that do: a
+        fit that moves one of its parameters works out anew what acts after it.
     sidewise
         Names of parameters that make port and starboard unlike: a hull whose two sides are alike cannot take after them.
     unsteady
@@ -256,6 +259,7 @@ class Effect:
     profiled: str = ""
     by_row: bool = False
     of_sensor: bool = False
+    acts_last: bool = False
     sidewise: tuple[str, ...] = ()
     unsteady: Callable[[ForceModel], Processes] | None = None
     doubt: Callable[[Values, Profile], str] = lambda values, profile: ""
@@ -307,7 +311,7 @@ class Effect:
     @property
     def order(self) -> int:
         """When it acts among others: what corrects the measurements first, then what the others build on."""
-        return 0 if self.of_sensor else 1 if self.unsteady is not None else 2
+        return 0 if self.of_sensor else 1 if self.unsteady is not None else 3 if self.acts_last else 2
 
     def act(
         self, force_model: ForceModel, p: Floats, instance: str | None, onset_s: float = 0.0, offset_s: float = inf

@@ -86,4 +86,5 @@ EFFECT = Effect(
     regressor=regressor,
     formula_error=EFFECTS.load_error,
     simulated=Simulated(load),
+    acts_last=True,
 )

@@ -98,4 +98,5 @@ EFFECT = Effect(
     simulated=Simulated(load),
     rare_in=("tank", "pond", "sea"),
     common_in=("harbour",),
+    acts_last=True,
 )

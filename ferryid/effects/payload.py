@@ -123,4 +123,5 @@ EFFECT = Effect(
     profiled="mass",
     doubt=doubt,
     by_row=True,
+    acts_last=True,
 )

@@ -186,4 +186,5 @@ EFFECT = Effect(
     changes_hull=True,
     rare_in=("tank", "sea"),
     common_in=("pond", "harbour"),
+    acts_last=True,
 )

@@ -152,4 +152,5 @@ EFFECT = Effect(
     absent_in=("tank",),
     common_in=("pond", "harbour", "sea"),
     by_row=True,
+    acts_last=True,
 )

@@ -8,8 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ferryid.diagnose.inference.candidate import acting_order
 from ferryid.diagnose.inference.estimation import Candidate, apply_candidates
 from ferryid.effects import effects
+from ferryid.effects.effect import Effect
 from ferryid.effects.force_model import (
     COEFFICIENTS,
     UNITS,
@@ -225,6 +227,34 @@ def test_what_corrects_the_measurements_acts_before_the_wind_whatever_the_order(
         FERRY.wind, np.broadcast_to(wind, (N, 2)), one.measurements.psi - np.radians(20.0), forth.measurements.nu
     )
     np.testing.assert_allclose(forth.external, true, atol=1e-9 * np.abs(true).max())
+
+
+@pytest.mark.parametrize("last", [one for one in effects().values() if one.acts_last], ids=lambda one: one.id)
+def test_what_acts_last_does_the_same_first(last: Effect) -> None:
+    """It works out nothing from what the others change, so that a fit need not work out the others anew."""
+    one = force_model(flow=True, load=True, damped=True)
+    own = last.parameters_of(FERRY)
+    values = np.array([each.neutral + 0.3 * each.size for each in own])
+    tried = 0
+    for other in effects().values():
+        # Masses that are off are grown in shallow water, and by a load, as they are then.
+        if other.order != 2 or other.of_coefficients or other.id == last.id:
+            continue
+        theirs = other.parameters_of(FERRY)
+        moved = np.array([each.neutral + 0.3 * each.size for each in theirs])
+        instance = other.instances(FERRY)[0]
+        after = last.act(other.act(one, moved, instance), values, None)
+        before = other.act(last.act(one, values, None), moved, instance)
+        np.testing.assert_allclose(as_measured(after), as_measured(before), rtol=1e-9, atol=1e-9, err_msg=other.id)
+        assert np.abs(as_measured(after) - as_measured(one)).max() > 1e-6
+        tried += 1
+    assert tried > 5
+
+
+def test_what_acts_last_has_its_turn_last_and_large_ones_at_the_very_end() -> None:
+    names = ["shallow_water", "wind", "external_push", "current", "heading_bias"]
+    order = acting_order([suspect(name) for name in names])
+    assert [names[k] for k in order] == ["heading_bias", "current", "external_push", "wind", "shallow_water"]
 
 
 def test_gusts_raise_the_mean_load_as_an_average_over_many_does() -> None:

@@ -136,5 +136,10 @@ def apply_candidates(force_model: ForceModel, candidates: Sequence[Candidate], v
 
 
 def acting_order(candidates: Sequence[Candidate]) -> list[int]:
-    """Return the places of candidates in the order in which they act."""
-    return sorted(range(len(candidates)), key=lambda i: candidates[i].effect.order)
+    """Return the places of candidates in the order in which they act; of those that may act last, large ones at the end."""
+
+    def turn(i: int) -> tuple[int, int]:
+        effect = candidates[i].effect
+        return effect.order, len(candidates[i].parameters) if effect.acts_last else 0
+
+    return sorted(range(len(candidates)), key=turn)

@@ -28,7 +28,7 @@ MAX_ITERATIONS = 24
 HULL_SLOPE_ITERATIONS = 4
 """Iterations after which the derivatives by the hull's coefficients are computed again."""
 CONVERGED_GAIN = 1e-2
-"""Gain in cost of an iteration below which the fit has converged."""
+"""Gain in cost of an iteration, promised or made, below which the fit has converged."""
 HULL_DIFFERENCE = 0.1
 """Finite difference of a coefficient of the hull, in its spread."""
 DAMPINGS = (0.0, 0.3, 3.0, 30.0, 300.0)
@@ -198,6 +198,12 @@ class StartingPoint:
         slopes = self.by_hull[:, free]
         return free, slopes, slopes.T @ slopes
 
+    def moved_to(self, hull: Floats) -> StartingPoint:
+        """Return it with another hull, shape (26,), for fits that are so near that the derivatives hold there too."""
+        moved = replace(self, hull=hull)
+        moved.__dict__["by_free_hull"] = self.by_free_hull
+        return moved
+
 
 def starting_point(problem: EstimationProblem, made: Fit) -> StartingPoint:
     """Return where to begin a fit that is not far from another."""
@@ -311,12 +317,11 @@ def fit(
         slope, gained = z.copy(), 0.0
         slope[both] += np.concatenate([by_hull.T @ w, by_effects.T @ w])
         whole = newton_step(A, slope, lowest, highest)
-        if least > -inf:
-            # The score test: what the linearisation promises, and a multiple of it as the most that there may be.
-            promised = -float(2.0 * slope @ whole + whole @ A @ whole)
-            if evidence_of(cost - promised * INFERENCE.linearisation_factor, A) < least:
-                break
-        for damping in DAMPINGS:
+        promised = -float(2.0 * slope @ whole + whole @ A @ whole)
+        # The score test: what the linearisation promises, and a multiple of it as the most that there may be.
+        if least > -inf and evidence_of(cost - promised * INFERENCE.linearisation_factor, A) < least:
+            break
+        for damping in DAMPINGS if promised >= CONVERGED_GAIN else ():
             # Levenberg's and Marquardt's way, where the whole step leads astray.
             step = whole
             if damping > 0.0:

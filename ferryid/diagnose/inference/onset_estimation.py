@@ -351,7 +351,8 @@ def refine_span(
                     replace_candidate(best.candidates, index, moved),
                     best.values,
                     steps=COMPARING_ITERATIONS,
-                    begin=begin,
+                    begin=begin.moved_to(best.hull),
+                    least=best.evidence,
                 )
                 best = max(best, tried, key=lambda one: one.evidence)
         step *= 0.5 if best.candidates[index] == before else 1.0

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
+from ferryid.compiled import borrowing, compiled
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted_force_model
 from ferryid.diagnose.inference.folds import Folds, by_block, draws
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
-from ferryid.effects.force_model import ForceModel, Measurements, acceleration
+from ferryid.effects.equations_of_motion import acceleration_in
+from ferryid.effects.force_model import ForceModel, Measurements, check_rows
 from ferryid.types import Floats, Ints
+
+DIVERGED = 1e6
+"""State beyond which a free run is stopped [m, rad, m/s, rad/s]."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +72,7 @@ def free_runs(problem: EstimationProblem, folds: Folds, before: Sequence[Fit], a
         if own.size == 0:
             continue
         for which, fits in enumerate((before, after)):
-            path = _run(fitted_force_model(problem.plain, fits[k]), starts[own], stride, int(steps[-1]))
+            path = run_freely(fitted_force_model(problem.plain, fits[k]), starts[own], stride, int(steps[-1]))
             for h, count in enumerate(steps):
                 rows = starts[own] + stride * int(count)
                 inside = rows <= last[own]
@@ -91,43 +97,75 @@ def _starts(windows: Windows, folds: Folds, shortest: int) -> tuple[Ints, Ints, 
     return np.array(starts, dtype=np.int64), np.array(last, dtype=np.int64), np.array(block, dtype=np.int64)
 
 
-def _run(force_model: ForceModel, starts: Ints, stride: int, steps: int) -> Floats:
-    """Return states of all runs, shape (steps + 1, starts, 6)."""
+def run_freely(force_model: ForceModel, starts: Ints, stride: int, steps: int) -> Floats:
+    """Return states that begin in some rows as measured: place, heading and velocity over ground, shape (steps + 1, s, 6).
+
+    Heun's rule with steps of `stride` rows and the forces of these; the last row's beyond it. What diverges is NaN.
+    """
     measurements = force_model.measurements
-    end, dt = len(measurements.t) - 1, stride * measurements.step_s
-    state = np.hstack([np.nan_to_num(measurements.eta[starts]), measurements.nu[starts]])
-    path = np.empty((steps + 1, len(starts), 6))
-    path[0] = state
-    rate = _rates(force_model, np.minimum(starts, end), state)
-    for k in range(steps):
-        following = np.minimum(starts + (k + 1) * stride, end)
-        after = _rates(force_model, following, state + dt * rate)
-        state = state + 0.5 * dt * (rate + after)
-        # What diverges is stopped, and left out where errors are judged.
-        state = np.where(np.abs(state) < 1e6, state, np.nan)
-        path[k + 1] = state
-        rate = _rates(force_model, following, state)
+    check_rows(force_model)
+    begin = np.hstack([np.nan_to_num(measurements.eta[starts]), measurements.nu[starts]])
+    flow = np.empty((0, 2)) if force_model.flow is None else force_model.flow
+    load = np.empty((0, 5)) if force_model.load is None else force_model.load
+    factor = np.empty(0) if force_model.damping_factor is None else force_model.damping_factor
+    every = (force_model.hull, force_model.parts, force_model.external, flow, load, factor)
+    return _run(begin, starts, stride, steps, stride * measurements.step_s, *map(np.ascontiguousarray, every))
+
+
+@borrowing
+def _rate(
+    row: int,
+    state: Floats,
+    hull: Floats,
+    parts: Floats,
+    external: Floats,
+    flow: Floats,
+    load: Floats,
+    factor: Floats,
+    out: Floats,
+) -> None:
+    """Fill in the derivative of a state with the forces of a row, shape (6,) each."""
+    c, s = math.cos(state[2]), math.sin(state[2])
+    u, v, r = state[3], state[4], state[5]
+    north, east = (flow[row, 0], flow[row, 1]) if flow.shape[0] > 0 else (0.0, 0.0)
+    ahead, starboard = c * north + s * east, c * east - s * north
+    a, b, turning = acceleration_in(row, u - ahead, v - starboard, r, hull, parts, external, load, factor)
+    out[0], out[1], out[2] = c * u - s * v, s * u + c * v, r
+    # The body frame turns through the water.
+    out[3], out[4], out[5] = a + r * starboard, b - r * ahead, turning
+
+
+@compiled
+def _run(
+    begin: Floats,
+    starts: Ints,
+    stride: int,
+    steps: int,
+    step_s: float,
+    hull: Floats,
+    parts: Floats,
+    external: Floats,
+    flow: Floats,
+    load: Floats,
+    factor: Floats,
+) -> Floats:
+    path = np.empty((steps + 1, begin.shape[0], 6))
+    last = external.shape[0] - 1
+    rate, after, moved = np.empty(6), np.empty(6), np.empty(6)
+    for i in range(begin.shape[0]):
+        path[0, i] = begin[i]
+        _rate(min(starts[i], last), begin[i], hull, parts, external, flow, load, factor, rate)
+        for k in range(steps):
+            row = min(starts[i] + (k + 1) * stride, last)
+            for j in range(6):
+                moved[j] = path[k, i, j] + step_s * rate[j]
+            _rate(row, moved, hull, parts, external, flow, load, factor, after)
+            for j in range(6):
+                new = path[k, i, j] + 0.5 * step_s * (rate[j] + after[j])
+                # What diverges is stopped, and left out where errors are judged.
+                path[k + 1, i, j] = new if abs(new) < DIVERGED else math.nan
+            _rate(row, path[k + 1, i], hull, parts, external, flow, load, factor, rate)
     return path
-
-
-def _rates(force_model: ForceModel, rows: Ints, state: Floats) -> Floats:
-    """Return the derivative of states, shape (s, 6), with the forces of some rows."""
-    nu, psi = state[:, 3:], state[:, 2]
-    now: Measurements = replace(
-        force_model.measurements, t=force_model.measurements.t[rows], eta=state[:, :3], nu=nu, nu_raw=nu
-    )
-    at = replace(
-        force_model,
-        measurements=now,
-        parts=force_model.parts[rows],
-        external=force_model.external[rows],
-        flow=None if force_model.flow is None else force_model.flow[rows],
-        load=None if force_model.load is None else force_model.load[rows],
-        damping_factor=None if force_model.damping_factor is None else force_model.damping_factor[rows],
-    )
-    c, s = np.cos(psi), np.sin(psi)
-    velocity = np.column_stack([c * nu[:, 0] - s * nu[:, 1], s * nu[:, 0] + c * nu[:, 1], nu[:, 2]])
-    return np.hstack([velocity, acceleration(at)])
 
 
 def _error(measurements: Measurements, rows: Ints, state: Floats) -> Floats:
