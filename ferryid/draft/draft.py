@@ -135,6 +135,8 @@ def draft_profile(log: str | Path, like: Profile | None = None, ranges: TimeRang
     actuators = drafted_actuators(fields, samples, motion, driven.placements)
     if not actuators:
         still = [] if changing(looked_for, samples) else [f"{one.topic}: {one.path}" for one in looked_for]
+        # What a topic carries of several actuators is parted by what changes.
+        still = still or [f"{one.topic}: {one.value}" for one in shared]
         what = (
             f"nothing that looks like an actuator ever changes, found {_listed(still)}"
             if still

@@ -430,6 +430,10 @@ def _velocity(velocity: FieldGroup, chosen: _Agreement, others: Sequence[str]) -
         doubts.append("its unit is assumed" if velocity.frame or velocity.named_frame else "unit and frame are assumed")
     elif abs(log(max(left, 1e-3))) > DRAFT.gain:
         doubts.append(f"it is {left:.2f} times the position's slope, which no unit explains")
+    elif not stated and unit != _SPEED_UNITS[0] and DRAFT.agrees <= chosen.share < DRAFT.shows_unit:
+        doubts.append(
+            f"its unit follows from its size alone, and the position's slope explains only {100 * chosen.share:.0f} % of it"
+        )
     if chosen.frame in _BODY and abs(chosen.sway) < DRAFT.seen:
         doubts.append(
             f"sway is too small to show its sign (correlation {chosen.sway:.2f}): positive to "

@@ -38,6 +38,12 @@ class DraftThresholds:
     agrees: float = threshold(
         0.5, "of the variance", "a velocity of which the pose explains less is a doubt", "convention: half"
     )
+    shows_unit: float = threshold(
+        0.9,
+        "of the variance",
+        "a velocity of which the pose explains less is in another unit than m/s only with a doubt",
+        "derived: where it is 0.9, noise of the velocity makes it up to 11 % too large, and km/h and ft/s are 10 % apart",
+    )
     most_rad: float = threshold(6.6, "rad", "an angle that goes beyond is in degrees", "derived: 2π and 5 % of it")
     most_percent: float = threshold(
         105.0, "%", "an order that goes beyond is no share of full power", "derived: 100 % and 5 % of it"

@@ -160,9 +160,11 @@ def as_text(draft: Draft, file: str, text: str) -> str:
     count, mark = open_lines(text), MARK.removeprefix("# ").rstrip(":")
     # A profile can do without the areas that a wind acts on.
     wind = " (those of [wind] only if a wind is to be tested)" if f"{MARK} [wind]" in text else ""
-    todo = f"fill in {counted(count, 'line')} marked {mark}{wind}, then " if count else ""
-    steps = [f"ferryid {verb} {quote(draft.log)} --vessel {quote(file)}" for verb in ("inspect", "fit")]
-    lines.append(f"next    {todo}ferryid vessel check {quote(file)}, {', '.join(steps)}")
+    steps = [f"fill in {counted(count, 'line')} marked {mark}{wind}, then"] if count else []
+    steps.append(f"ferryid vessel check {quote(file)}")
+    steps += [f"ferryid {verb} {quote(draft.log)} --vessel {quote(file)}" for verb in ("inspect", "fit")]
+    # Each on a line of its own, to be copied.
+    lines += [f"{'' if k else 'next':<8}{step}" for k, step in enumerate(steps)]
     return "\n".join(lines)
 
 

@@ -43,8 +43,8 @@ def wrong_way(
     if not wrong:
         return ""
     told = ", ".join(
-        f"the {_FORCES[axis]} accelerates the vessel in {AXES[axis]} by {response[axis]:.2g} ± {spread[axis]:.1g} of what the "
-        "base model expects"
+        f"the {_FORCES[axis]} accelerates the vessel in {AXES[axis]} by {response[axis]:.2g} ± {spread[axis]:.1g} times what "
+        "the base model expects"
         for axis in wrong
     )
     if max(-response[axis] for axis in wrong) < IDENTIFY.opposite:
@@ -106,7 +106,7 @@ def wrong_size(response: Floats, spread: Floats, share: Floats, profile: str) ->
     if not (large or small):
         return ""
     measured = ", ".join(f"{AXES[axis]} {response[axis]:.2g} ± {spread[axis]:.1g}" for axis in np.flatnonzero(known))
-    told = f"the applied forces accelerate the vessel by {measured} of what the base model expects: "
+    told = f"the applied forces accelerate the vessel by {measured} times what the base model expects: "
     if small:
         cause = "they are several times too small, or the profile's mass is too large"
     else:

@@ -40,6 +40,7 @@ from ferryid.identify.window_length import with_best_length
 from ferryid.models import Model, ModelScores
 from ferryid.models.store import check_name
 from ferryid.regression.bases import Basis
+from ferryid.signals.artificial import NO_RECORDING
 from ferryid.signals.prepare import Opened, smoothed
 from ferryid.signals.smooth import smooth_measured
 from ferryid.types import Flags, RunContext
@@ -234,6 +235,15 @@ def accept_estimate(
     if whole is not None:
         model = _model(told, final, stored, name, scores, acceptance, told.excitation(final))
         model = replace(model, settings={**model.settings, "estimated_from": "all rows"})
+    # Those of the model first: a season has many logs with something to say each.
+    warnings = (
+        *final.held,
+        *free_run_warnings(free_base, free_new),
+        *sign_changes(model),
+        *told.condition_notes,
+        *final.notes,
+        *data.warnings(excitation, scores),
+    )
     return FitOutcome(
         model=model,
         judged=judged,
@@ -243,15 +253,8 @@ def accept_estimate(
         excitation=excitation,
         free_run_base=free_base,
         free_run_model=free_new,
-        # Those of the model first: a season has many logs with something to say each.
-        warnings=(
-            *final.held,
-            *free_run_warnings(free_base, free_new),
-            *sign_changes(model),
-            *told.condition_notes,
-            *final.notes,
-            *data.warnings(excitation, scores),
-        ),
+        # Before all: what was fitted is no vessel's motion.
+        warnings=tuple(sorted(warnings, key=lambda one: NO_RECORDING not in one)),
         logs=logs,
         archive=data.archived_logs(found),
         winds=told.winds,

@@ -50,11 +50,12 @@ def render(
     several = len(diagnoses) > 1
     shared = diagnosis_words.notes_of_all(diagnoses)
     gathered = [note for note in shared if note in diagnoses[0].gathered]
+    foremost = [] if several else diagnosis_words.foremost_notes(diagnoses[0])
     common = diagnosis_words.findings_of_all(diagnoses)
     together = second_sources.of_all(diagnoses)
     logs = [
         {
-            **_log(one, f"{k + 1}-" if several else "", k < MAX_LOGS, shared, common, drawings),
+            **_log(one, f"{k + 1}-" if several else "", k < MAX_LOGS, [*shared, *foremost], common, drawings),
             "timeline": interactive.number(k),
         }
         for k, one in enumerate(diagnoses)
@@ -76,6 +77,7 @@ def render(
         sign=diagnosis_words.SIGN,
         made=made,
         gathered=gathered,
+        foremost=foremost,
         shared_notes=[note for note in shared if note not in gathered],
         shared_sources=second_sources.section(together) if together else {},
         shared_model=diagnosis_words.model_of_all(diagnoses),
@@ -131,7 +133,9 @@ def _several_as_text(diagnoses: Sequence[Diagnosis]) -> str:
 
 
 def _one_as_text(one: Diagnosis) -> str:
-    lines = [f"{one.log}: {diagnosis_words.summary([one])}", *_listed(one.findings)]
+    foremost = diagnosis_words.foremost_notes(one)
+    lines = [f"{one.log}: {diagnosis_words.summary([one])}", *(f"note: {note}" for note in foremost)]
+    lines += _listed(one.findings)
     rows = diagnosis_errors.force_rows(one)
     if rows:
         lines += ["", f"{'on held-out data':<44}" + "".join(f"{axis:>22}" for axis in AXES)]
@@ -145,7 +149,7 @@ def _one_as_text(one: Diagnosis) -> str:
         for row in runs:
             lines.append(f"{row['name']:<44}" + "".join(f"{cell:>22}" for cell in row["cells"][: len(names)]))
     hidden = [f"withheld {one_hidden.signal}: {one_hidden.says}" for one_hidden in one.withheld]
-    remarks = [*hidden, *(f"note: {note}" for note in diagnosis_words.notes_of(one))]
+    remarks = [*hidden, *(f"note: {note}" for note in diagnosis_words.notes_of(one, foremost))]
     remarks += [f"note: {text}"] if (text := least_sizes.line(one)) else []
     if one.likeness_of_all is None:
         remarks += [f"note: {note}" for note in likeness.notes(one.likeness, "this log")]

@@ -516,6 +516,11 @@ def notes_of(diagnosis: Diagnosis, told: Sequence[str] = ()) -> list[str]:
     return [note for note in dict.fromkeys(diagnosis.notes) if note not in told]
 
 
+def foremost_notes(diagnosis: Diagnosis) -> list[str]:
+    """Return those notes on a single log that come before its findings: that it is no recording, and what was left out."""
+    return [note for note in notes_of(diagnosis) if note in diagnosis.gathered]
+
+
 def about_log(diagnosis: Diagnosis) -> str:
     """Return how long the log is."""
     if diagnosis.duration_s is None:

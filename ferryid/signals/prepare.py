@@ -12,7 +12,7 @@ import numpy as np
 from ferryid.cached import cached_property
 from ferryid.errors import FerryIdError
 from ferryid.signals.align import align
-from ferryid.signals.artificial import artificial
+from ferryid.signals.artificial import NO_RECORDING, artificial
 from ferryid.signals.data_quality import left_out_sentences
 from ferryid.signals.faults import Faults
 from ferryid.signals.quality import POSE
@@ -73,7 +73,7 @@ def doubts_of(recording: Recording, track: Track, *, origin: bool = True) -> tup
     why = artificial(recording) if origin else ""
     empty = [name for name in POSE if name in track.columns and not np.isfinite(track.columns[name]).any()]
     return (
-        *((f"It is no recording of a vessel: {why}.",) if why else ()),
+        *((f"{NO_RECORDING}: {why}.",) if why else ()),
         *(doubt.says for doubt in track.doubts),
         *(repair for repair in track.repairs if repair == SWAY_NOT_MEASURED),
         *recording.orders_for_feedback,

@@ -207,6 +207,19 @@ def test_a_velocity_that_no_unit_explains_is_to_be_checked(tmp_path: Path) -> No
     assert any("their size is 1.4" in one for one in found["position"].evidence)
 
 
+@pytest.mark.parametrize(("noise_m", "told"), [(0.01, False), (1.0, True)])
+def test_a_unit_that_noise_may_have_made_is_to_be_checked(tmp_path: Path, noise_m: float, told: bool) -> None:
+    c = in_ned(sailed())
+    noise = noise_m * np.random.default_rng(5).normal(size=(2, len(c["t"])))
+    columns = c | {"N": c["N"] + noise[0], "E": c["E"] + noise[1], "u": 3.6 * c["u"], "v": 3.6 * c["v"]}
+    _, found = drafted(tmp_path, columns)
+    assert found["velocity"].unit == "km/h"
+    assert any("its unit follows from its size alone" in one for one in found["velocity"].doubts) == told
+    plain = drafted(tmp_path, columns | {"u": c["u"], "v": c["v"]})[1]["velocity"]
+    assert plain.unit == "m/s"
+    assert not any("its unit follows" in one for one in plain.doubts)
+
+
 def test_no_size_is_stated_of_a_velocity_that_does_not_agree(tmp_path: Path) -> None:
     c = in_ned(sailed())
     noise = np.random.default_rng(3).normal(size=(2, len(c["t"])))
@@ -418,6 +431,20 @@ def test_actuators_that_share_a_topic(tmp_path: Path) -> None:
     text = draft_text(draft, Answers("boat")).replace("# FILL IN: ", "")
     signals = {signal.quantity: signal for signal in parse_profile(text, "boat.toml").signals}
     assert signals["msg3.speed.command"].where == (("dev_id", 10.0), ("msg_id", 3.0))
+
+
+def test_orders_on_a_shared_topic_that_never_change_are_no_missing_orders(tmp_path: Path) -> None:
+    c = sailed(60.0)
+    folder = tmp_path / "log"
+    folder.mkdir()
+    nav = np.column_stack([c[name] for name in ("t", "N", "E", "psi", "u", "v", "r")])
+    orders = [f"{t + 0.01 * number:.2f},10,{number},250.0\n" for t in c["t"] for number in (3, 5)]
+    np.savetxt(folder / "nav.csv", nav, "%.6g", ",", header="t,N,E,psi,u,v,r", comments="")
+    (folder / "motors.csv").write_text("t,dev_id,msg_id,data\n" + "".join(orders), encoding="utf-8")
+    with pytest.raises(
+        FerryIdError, match=r"nothing .* like an actuator ever changes, found /motors: data\. Fix: record while"
+    ):
+        draft_profile(folder)
 
 
 def test_an_answer_makes_an_order_of_a_signal(tmp_path: Path) -> None:

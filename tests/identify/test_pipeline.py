@@ -16,6 +16,7 @@ from ferryid.identify.outcome import FitOutcome
 from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.settings import FitSettings
 from ferryid.models.forces.estimator import effective_mass, model_estimator
+from ferryid.signals.artificial import NO_RECORDING
 from ferryid.signals.prepare import Opened, open_track
 from ferryid.signals.track import Doubt
 from ferryid.types import RunContext
@@ -86,6 +87,15 @@ def test_warnings_of_the_model_come_before_those_of_single_logs(
         for says in ("it turns in circles.", doubt.says)
     )
     assert of_model < of_log
+
+
+@pytest.mark.slow
+def test_that_a_log_is_no_recording_comes_before_all(monkeypatch: pytest.MonkeyPatch, opened: Opened) -> None:
+    doubt = Doubt(f"{NO_RECORDING}: it is simulated.", certain=False)
+    monkeypatch.setattr(pipeline, "free_run_warnings", lambda *_: ("Run free for 5 s it turns in circles.",))
+    result = fitted(monkeypatch, replace(opened, track=replace(opened.track, doubts=(doubt,))))
+    assert result.warnings[0].endswith(doubt.says)
+    assert len(result.warnings) > 1
 
 
 @pytest.mark.slow

@@ -420,7 +420,7 @@ def test_forces_that_act_the_wrong_way_are_refused_with_their_cause(
     turned = [replace(one, tau=one.tau * signs) for one in logs]
     with pytest.raises(
         FerryIdError,
-        match=rf"accelerates the vessel in .* of what the base model expects.*{cause}.* Fix: in the profile",
+        match=rf"accelerates the vessel in .* times what the base model expects.*{cause}.* Fix: in the profile",
     ):
         data_of(turned).refuse_contradictions()
 

@@ -79,6 +79,17 @@ def test_which_logs_take_part_stands_before_all_logs(tmp_path: Path) -> None:
     assert "Which logs take part" not in report(campaign(), tmp_path).report.read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
+@pytest.mark.blank
+def test_that_a_log_is_no_recording_stands_before_its_findings(tmp_path: Path) -> None:
+    """Findings in what no sensor measured are read as a vessel's, where it stands last."""
+    simulated, rest = "first.csv is no recording of a vessel: it is simulated.", "Not tested: gusts."
+    one = replace(campaign()[0], notes=(rest, simulated), gathered=(simulated,))
+    for told in (as_text([one]), report([one], tmp_path).report.read_text(encoding="utf-8")):
+        assert told.count(simulated) == told.count(rest) == 1
+        assert told.index(simulated) < told.index(one.findings[0].says[:30]) < told.index(rest)
+
+
 def test_a_single_log_shares_nothing() -> None:
     assert "In all logs" not in as_text(campaign()[:1])
 
