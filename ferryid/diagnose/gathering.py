@@ -143,7 +143,7 @@ def sort_out(logs: Sequence[AveragedLog], whose: str) -> tuple[list[AveragedLog]
     artificial = {one.path: why for one in logs if (why := _simulated(one))}
     if artificial and len(artificial) == len(logs):
         return list(logs), [
-            f"{path} is no recording of a vessel: {why}. What is found in it is the simulator's."
+            f"{path} is no recording of a vessel: {why}. What is found in it is that simulator's or filter's, not a vessel's."
             for path, why in artificial.items()
         ]
     notes = [

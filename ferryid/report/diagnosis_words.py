@@ -58,6 +58,8 @@ UNRECORDED = "unrecorded_force"
 """A force that the records of the actuators lack: no fault of a sensor, and nothing that could be corrected."""
 NOT_CORRECTED = "not corrected"
 """What the sentence of a sensor fault says that is told and left as it is, as a clock offset in a short log."""
+IS_A_HINT = " is a hint: "
+"""What stands in a note between a finding and the reason that makes a hint of it."""
 APART = 0.1
 """Share of the squared force error by which a finding alone may remove more than all do, before the headline says why."""
 
@@ -513,7 +515,22 @@ def notes_of_all(diagnoses: Sequence[Diagnosis]) -> tuple[str, ...]:
 
 def notes_of(diagnosis: Diagnosis, told: Sequence[str] = ()) -> list[str]:
     """Return the notes of a log, each once, without those that were told of all logs."""
-    return [note for note in dict.fromkeys(diagnosis.notes) if note not in told]
+    return _with_one_reason([note for note in dict.fromkeys(diagnosis.notes) if note not in told])
+
+
+def _with_one_reason(notes: Sequence[str]) -> list[str]:
+    """Return notes in which findings that are hints for one reason are told together, where the first of them stands."""
+    titles = dict[str, list[str]]()
+    for note in notes:
+        title, _, why = note.partition(IS_A_HINT)
+        titles.setdefault(why, []).append(title)
+    together = {
+        f"{alike[0]}{IS_A_HINT}{why}": f"Each of {listed(list(map(uncapitalised, alike)))}{IS_A_HINT}{why}"
+        for why, alike in titles.items()
+        if why and len(alike) > 1
+    }
+    taken = {f"{title}{IS_A_HINT}{why}" for why, alike in titles.items() if why for title in alike[1:]}
+    return [together.get(note, note) for note in notes if note not in taken]
 
 
 def foremost_notes(diagnosis: Diagnosis) -> list[str]:

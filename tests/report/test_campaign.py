@@ -17,7 +17,7 @@ from ferryid.report.campaign import _sizes
 from ferryid.report.diagnosis_page import as_text
 from ferryid.report.diagnosis_report import as_json, report
 from ferryid.report.diagnosis_timeline import timelines
-from ferryid.report.diagnosis_words import estimate, numbers_of, title
+from ferryid.report.diagnosis_words import estimate, notes_of, numbers_of, title
 from tests.report.test_diagnosis import conforms, diagnosis, gain, wind
 
 SHARED = "thruster1 gives 85 % of the force that its speed promises."
@@ -88,6 +88,21 @@ def test_that_a_log_is_no_recording_stands_before_its_findings(tmp_path: Path) -
     for told in (as_text([one]), report([one], tmp_path).report.read_text(encoding="utf-8")):
         assert told.count(simulated) == told.count(rest) == 1
         assert told.index(simulated) < told.index(one.findings[0].says[:30]) < told.index(rest)
+
+
+def test_findings_that_one_reason_makes_hints_are_told_together() -> None:
+    notes = (
+        "Steady wind is a hint: it is brief.",
+        "Not tested: gusts.",
+        "Thruster force (bow) is a hint: it is brief.",
+        "Steady wind is a hint: it is weak.",
+        "Payload is a hint: it is brief.",
+    )
+    assert notes_of(replace(campaign()[0], notes=notes)) == [
+        "Each of steady wind, thruster force (bow) and payload is a hint: it is brief.",
+        "Not tested: gusts.",
+        "Steady wind is a hint: it is weak.",
+    ]
 
 
 def test_a_single_log_shares_nothing() -> None:

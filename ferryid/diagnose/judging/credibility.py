@@ -10,7 +10,7 @@ from scipy.special import chdtri, ndtri  # scipy.stats takes a third of a second
 
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit
-from ferryid.diagnose.inference.estimation import EstimationProblem, Fit
+from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted_force_model
 from ferryid.diagnose.inference.force_errors import mass_of
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.thresholds import JUDGING
@@ -80,6 +80,24 @@ def refitted_hull(problem: EstimationProblem, kept: Fit, *, known: bool = True) 
     return RefittedHull(
         _farthest(before, spread, kept.hull),
         impossible_masses(profile, hull) if known else impossible_throughout(profile, hull),
+    )
+
+
+def idle_actuators(problem: EstimationProblem, kept: Fit) -> str:
+    """Return that a fit explains the motion all but without its actuators, as the end of a sentence; empty where it does not.
+
+    Forces that the motion does not follow fit best where they are none: masses and damping then have nothing to be told by.
+    """
+    usable = problem.plain.measurements.usable
+    recorded, left = (
+        float(np.linalg.norm(one.parts[usable, :, :2]))
+        for one in (problem.plain, fitted_force_model(problem.plain, kept))
+    )
+    if left >= JUDGING.idle_share * recorded:
+        return ""
+    return (
+        f"beside it, the actuators are left with {100.0 * left / recorded:.0f} % of their recorded force: the motion does not "
+        "follow that, as where they were not engaged, or their signals, directions, units or times are not those of the vessel"
     )
 
 

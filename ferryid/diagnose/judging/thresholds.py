@@ -257,6 +257,12 @@ class JudgingThresholds:
         "held-out error that a finding must remove on some axis while it acts",
         "tuned on cases of `ferryid prove`: clean logs named small inflow losses and currents",
     )
+    idle_share: float = threshold(
+        0.1,
+        "of the recorded force",
+        "force of all actuators below which nothing that was found beside it is sure",
+        "convention: one of several may have lost all of its force, and a vessel that is driven has most of it",
+    )
     slow_below_hz: float = threshold(
         0.2,
         "Hz",

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.data.estimate import Estimate
-from ferryid.diagnose.inference.estimation import Candidate
+from ferryid.diagnose.inference.estimation import Candidate, Fit
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging import campaign_properties, conclude
 from ferryid.diagnose.judging.campaign_conditions import ConditionTest
@@ -23,6 +23,7 @@ from ferryid.diagnose.judging.confidence_rules import apply_rules
 from ferryid.diagnose.judging.credibility import (
     RefittedHull,
     campaign_hull,
+    idle_actuators,
     impossible_masses,
     interval_doubt,
     refitted_hull,
@@ -37,7 +38,7 @@ from ferryid.diagnose.judging.posterior import HullPosterior, Posterior
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
 from ferryid.effects.effect import Parameter
-from ferryid.effects.force_model import COEFFICIENTS, hull_of
+from ferryid.effects.force_model import COEFFICIENTS, ForceModel, Measurements, hull_of
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.models import Quantity, Source, StoredEffect
 from ferryid.types import AXES
@@ -96,6 +97,27 @@ def fitted(hull: Any, *candidates: Any, known: bool = True) -> RefittedHull:
     )
     kept = SimpleNamespace(hull=hull, candidates=[one for one, _ in candidates], values=[p for _, p in candidates])
     return refitted_hull(cast(Any, problem), cast(Any, kept), known=known)
+
+
+def test_what_leaves_all_actuators_without_force_is_doubted() -> None:
+    """A fit to forces that the motion does not follow has none of them; one of two may well have failed."""
+    parts = np.random.default_rng(6).normal(size=(30, 2, 3))
+    still = np.zeros((30, 3))
+    usable = np.arange(30) < 25
+    parts[25:] = np.nan
+    measurements = Measurements(FERRY, 0.1 * np.arange(30), still, still, still, parts, np.zeros((30, 2)), usable)
+    plain = ForceModel(measurements, HULL, parts, measurements.angles, still)
+    gains = tuple(Candidate.of(effects()["thruster_gain"], name, FERRY) for name in ("thruster1", "thruster2"))
+
+    def doubt(*factors: float) -> str:
+        values = tuple(np.array([one]) for one in factors)
+        return idle_actuators(cast(Any, SimpleNamespace(plain=plain)), Fit(gains, values, np.eye(2), HULL, 0.0))
+
+    assert doubt(0.0, 1.0) == doubt(0.12, 0.12) == ""
+    said = doubt(0.03, 0.03)
+    assert said.startswith(
+        "beside it, the actuators are left with 3 % of their recorded force: the motion does not follow"
+    )
 
 
 def moved(coefficient: str, deviations: float) -> Any:
