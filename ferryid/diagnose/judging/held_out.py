@@ -321,16 +321,20 @@ def _proof(problem: EstimationProblem, folds: Folds, found: Fit, full: HeldOut, 
     # What acts seldom shows in a block or two, which half of the draws leave out.
     seldom = made.score > JUDGING.gain and made.score > JUDGING.gain + max(scores.values())
     holds = (holds or seldom) and not _matched(made.score, scores, alike)
-    if not holds and _hull_strains(problem, found, rest, start):
+    # What a hull that strains leaves of an effect says nothing of its size.
+    little = float(made.removed.max()) < JUDGING.least_removed
+    if (little or not holds) and _hull_strains(problem, found, rest, start):
         rigid = replace(problem, hull_spread=np.zeros_like(problem.hull_spread))
         stiff = held_out(rigid, folds, rest, start)
-        without, made = stiff, compare_held_out(problem, folds, stiff, full)
+        over_stiff = compare_held_out(problem, folds, stiff, full)
         # The same force late, or on a mirrored heading, has to be worse there too.
         own = held_out(rigid, folds, found.candidates, found.values)
-        gains, by_name = _gains(problem, folds, stiff.gaps, own.gaps), gains_of_placebos(rigid, stiff)
-        beaten = _beaten(picks, gains, by_name)
-        scores = {name: float(one.sum()) for name, one in by_name.items()}
-        holds = made.score_low > 0.0 and beaten > 0.0 and not _matched(made.score, scores, alike)
+        gains, by_stiff = _gains(problem, folds, stiff.gaps, own.gaps), gains_of_placebos(rigid, stiff)
+        beyond = _beaten(picks, gains, by_stiff)
+        theirs = {name: float(one.sum()) for name, one in by_stiff.items()}
+        held = over_stiff.score_low > 0.0 and beyond > 0.0 and not _matched(over_stiff.score, theirs, alike)
+        if held or not holds:
+            without, made, scores, beaten, holds = stiff, over_stiff, theirs, beyond, held
     return Proof(candidate, made, scores, beaten, holds, free_runs(problem, folds, without.fits, full.fits))
 
 
