@@ -6,14 +6,19 @@ from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from functools import partial
 
-from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, fit, without
+from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, without
 from ferryid.diagnose.inference.onset_estimation import is_brief
 from ferryid.diagnose.inference.search import is_negligible, prune
-from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.axis_consistency import check_axis_consistency
 from ferryid.diagnose.judging.credibility import interval_doubt
 from ferryid.diagnose.judging.held_out import HeldOutEvidence, held_out_evidence
-from ferryid.diagnose.judging.rivals import RivalComparison, compare_rivals, redundant_shape
+from ferryid.diagnose.judging.rivals import (
+    RivalComparison,
+    compare_rivals,
+    redundant_shape,
+    with_both,
+    without_companions,
+)
 from ferryid.diagnose.judging.size_estimates import size_estimates
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.judging.unexplained import find_displaced
@@ -79,32 +84,21 @@ def eliminate_backward(
             replaced, best = max(better, key=lambda pair: pair[1].gain)
             tried.add(best.fit.keys)
             swaps += 1
-            kept = prune(problem, _with_both(problem, kept, replaced, best.fit))
+            kept = prune(problem, with_both(problem, kept, replaced, best.fit))
             tried.add(kept.keys)
             continue
         progress("judging on held-out stretches")
         proof = held_out_evidence(problem, kept)
         fallen, why = _fallen(problem, kept, proof)
         if fallen is None:
+            # What fell may have been right: it is no rival of what is likely beside it.
+            standings = tuple(without_companions(problem, kept, i, one) for i, one in enumerate(standings))
             return Elimination(kept, proof, standings, _told(fallen_by_reason))
         if why:
             fallen_by_reason.setdefault(why, []).append(kept.candidates[fallen].title)
         kept = prune(problem, without(problem, kept, fallen))
         tried.add(kept.keys)
     return Elimination(kept, None, (), _told(fallen_by_reason))
-
-
-def _with_both(problem: EstimationProblem, kept: Fit, replaced: int, rival: Fit) -> Fit:
-    """Return a fit with a rival, and beside it what it replaces where that is more likely than not: both may act."""
-    candidate, values = kept.candidates[replaced], kept.values[replaced]
-    # The rival of a step stands beside its level all along.
-    others = [k for k, one in enumerate(rival.candidates) if one.key != candidate.key]
-    both = fit(
-        problem,
-        [*(rival.candidates[k] for k in others), candidate],
-        [*(rival.values[k] for k in others), values],
-    )
-    return both if both.evidence - rival.evidence > INFERENCE.prior_odds else rival
 
 
 def _told(fallen_by_reason: Mapping[str, Sequence[str]]) -> tuple[str, ...]:

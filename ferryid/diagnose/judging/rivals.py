@@ -176,6 +176,47 @@ def compare_rivals(problem: EstimationProblem, kept: Fit, index: int, library: S
     return RivalComparison(tuple(rivals), 1.0 / (1.0 + against), kept.evidence - bare.evidence)
 
 
+def with_both(problem: EstimationProblem, kept: Fit, index: int, rival: Fit) -> Fit:
+    """Return a fit with a rival, and beside it what it replaces where that is more likely than not: both may act."""
+    both = _beside(problem, kept, index, rival)
+    return both if both.evidence - rival.evidence > INFERENCE.prior_odds else rival
+
+
+def _beside(problem: EstimationProblem, kept: Fit, index: int, rival: Fit) -> Fit:
+    candidate, values = kept.candidates[index], kept.values[index]
+    # The rival of a step stands beside its level all along.
+    others = [k for k, one in enumerate(rival.candidates) if one.key != candidate.key]
+    return fit(
+        problem,
+        [*(rival.candidates[k] for k in others), candidate],
+        [*(rival.values[k] for k in others), values],
+    )
+
+
+def without_companions(problem: EstimationProblem, kept: Fit, index: int, standing: RivalComparison) -> RivalComparison:
+    """Return how a candidate stands where a rival may act beside it as well as in its place.
+
+    One beside which the candidate is still more likely than not is no rival: both act, whether or not the other has a name. The
+    probability is that of all hypotheses that hold the candidate: it alone, and beside each of the rivals that are near.
+    """
+    candidate = kept.candidates[index]
+    near = [
+        one
+        for one in standing.rivals
+        if one.gain > -JUDGING.unresolved_evidence and not same_curve(one.candidate, candidate, 1.0)
+    ]
+    if not near:
+        return standing
+    both = over(lambda one: _beside(problem, kept, index, one.fit).evidence, near)
+    held = [0.0, *(one - kept.evidence - INFERENCE.prior_odds for one in both)]
+    others = [INFERENCE.prior_odds - standing.evidence, *(one.gain for one in standing.rivals)]
+    top = max(*held, *others)
+    ours, theirs = (sum(exp(one - top) for one in some) for some in (held, others))
+    companions = [one for one, pair in zip(near, both, strict=True) if pair - one.fit.evidence > INFERENCE.prior_odds]
+    rivals = tuple(one for one in standing.rivals if not any(one is each for each in companions))
+    return replace(standing, rivals=rivals, probability=ours / (ours + theirs))
+
+
 def _may_stand_in(problem: EstimationProblem, beside: Linearisation, candidate: Candidate, other: Candidate) -> bool:
     """Tell whether another may stand in a candidate's place: what only passes explains nothing that lasts or comes often."""
     if not other.effect.passing:

@@ -11,8 +11,8 @@ import pytest
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, estimation_problem, fit, rest_of, without
 from ferryid.diagnose.inference.onset_estimation import turned
 from ferryid.diagnose.inference.search import search
-from ferryid.diagnose.judging.backward_elimination import _with_both
 from ferryid.diagnose.judging.posterior import _level, _level_otherwise
+from ferryid.diagnose.judging.rivals import with_both
 from ferryid.effects import effects
 from ferryid.models import Source
 from tests.diagnose.judging.test_onset_evidence import BEGAN_S, FAULT, GAIN, of_unknown_hull
@@ -64,8 +64,8 @@ def test_without_a_step_there_is_one_level_all_along(case: EstimationProblem, ma
     assert bare.candidates == (level,)
     assert bare.evidence < made.evidence - 20.0
     # A rival of the step stands beside that level, which the step brings along itself.
-    assert _with_both(case, made, 0, bare).keys == {STEP.key}
-    assert _with_both(case, made, 0, bare).candidates == (STEP,)
+    assert with_both(case, made, 0, bare).keys == {STEP.key}
+    assert with_both(case, made, 0, bare).candidates == (STEP,)
 
 
 def test_what_ends_at_a_time_is_said_to_begin_then(case: EstimationProblem, made: Fit) -> None:

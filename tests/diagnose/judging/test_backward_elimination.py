@@ -15,9 +15,9 @@ from ferryid.diagnose.judging.backward_elimination import (
     PLACEBO,
     _fallen,
     _told,
-    _with_both,
     eliminate_backward,
 )
+from ferryid.diagnose.judging.rivals import RivalComparison, RivalFit, with_both, without_companions
 from tests.diagnose.trials import sailed, trial_on
 
 pytestmark = pytest.mark.slow
@@ -66,9 +66,32 @@ def test_a_fit_ends_at_the_same_place_wherever_it_begins(problem: EstimationProb
 
 def test_what_a_rival_replaces_stays_beside_it_where_both_act(problem: EstimationProblem) -> None:
     loss, first = (fit(problem, of(problem, key)) for key in (LOSS, FIRST))
-    assert _with_both(problem, loss, 0, first).keys == {LOSS, FIRST}
+    assert with_both(problem, loss, 0, first).keys == {LOSS, FIRST}
     both, wrong = fit(problem, of(problem, LOSS, FIRST)), fit(problem, of(problem, SECOND))
-    assert _with_both(problem, wrong, 0, both) is both
+    assert with_both(problem, wrong, 0, both) is both
+
+
+def test_a_rival_that_acts_beside_a_finding_is_none_of_its_name(problem: EstimationProblem) -> None:
+    """Here a loss and a thruster's gain both act: that the one alone is likelier tells nothing against the other."""
+    first, loss = (fit(problem, of(problem, key)) for key in (FIRST, LOSS))
+    bare = fit(problem, ())
+
+    def standing(kept: Fit, rival: Fit) -> tuple[RivalComparison, RivalComparison]:
+        gain = rival.evidence - kept.evidence
+        against = RivalComparison((RivalFit(rival.candidates[0], rival, gain),), 0.0, kept.evidence - bare.evidence)
+        return against, without_companions(problem, kept, 0, against)
+
+    weaker, stronger = sorted((first, loss), key=lambda one: one.evidence)
+    before, after = standing(weaker, stronger)
+    assert before.unresolved(weaker.candidates[0]) == (stronger.candidates[0].effect.id,)
+    assert after.rivals == after.unresolved(weaker.candidates[0]) == ()
+    assert after.probability > 0.99
+    # The other thruster does not act, and what it seems to is this loss.
+    second = fit(problem, of(problem, SECOND))
+    both = fit(problem, of(problem, LOSS, FIRST))
+    wrong, judged = standing(second, both)
+    assert judged.rivals == wrong.rivals
+    assert judged.probability < 0.01
 
 
 def test_both_are_found_though_the_other_thrusters_gain_is_likelier_alone(problem: EstimationProblem) -> None:

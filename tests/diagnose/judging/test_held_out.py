@@ -14,14 +14,22 @@ from ferryid.diagnose.inference.force_errors import force_errors, mass_of
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.free_runs import free_runs
-from ferryid.diagnose.judging.held_out import HEADING, _matched, held_out, held_out_evidence, imitable, placebos
+from ferryid.diagnose.judging.held_out import (
+    HEADING,
+    _matched,
+    compare_held_out,
+    held_out,
+    held_out_evidence,
+    imitable,
+    placebos,
+)
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
 from ferryid.effects.effect import HELD
 from ferryid.effects.force_model import ForceModel, Measurements, hull_of
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.vessel import load_profile
-from ferryid.vessel.hull import current_in_body
+from ferryid.vessel.hull import current_in_body, payload_mass
 from ferryid.vessel.profile import Hull
 from ferryid.vessel.wind import wind_force
 from tests.vessel.hull_matrices import forward
@@ -196,6 +204,22 @@ def test_what_did_not_happen_gains_less_than_its_prior_odds_or_does_not_hold(cal
         told = held_out_evidence(calm, fit(calm, [candidate(name)]))
         assert told is not None
         assert not told.proofs[0].holds or told.proofs[0].improvement.score < INFERENCE.prior_odds, name
+
+
+def test_what_a_hull_imitates_by_straining_is_weighed_against_the_hull_of_the_model() -> None:
+    """A refitted hull that is off in all its coefficients leaves little of a load: that tells nothing of how much it weighs."""
+    aboard = replace(FERRY.hull, M=FERRY.hull.M + payload_mass(np.array([[200.0, 0.3]]))[0])
+    problem, load = trial_on(sailed(480.0, np.zeros(2), hull=aboard)), candidate("payload")
+    problem = problem.with_noise_of(fit(problem, [load]))
+    found, folds = fit(problem, [load]), folds_of(problem.windows)
+    assert folds is not None
+    refitted, full = held_out(problem, folds, ()), held_out(problem, folds, found.candidates, found.values, found)
+    assert compare_held_out(problem, folds, refitted, full).removed.max() < JUDGING.least_removed
+    evidence = held_out_evidence(problem, found)
+    assert evidence is not None
+    (proof,) = evidence.proofs
+    assert proof.holds
+    assert proof.improvement.removed.min() > 0.9
 
 
 def test_a_placebo_keeps_what_is_fitted_beside_an_effect_and_never_told(windy: EstimationProblem) -> None:
