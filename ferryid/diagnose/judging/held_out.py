@@ -321,9 +321,10 @@ def _proof(problem: EstimationProblem, folds: Folds, found: Fit, full: HeldOut, 
     # What acts seldom shows in a block or two, which half of the draws leave out.
     seldom = made.score > JUDGING.gain and made.score > JUDGING.gain + max(scores.values())
     holds = (holds or seldom) and not _matched(made.score, scores, alike)
-    # What a hull that strains leaves of an effect says nothing of its size.
-    little = float(made.removed.max()) < JUDGING.least_removed
-    if (little or not holds) and _hull_strains(problem, found, rest, start):
+    # What a hull that strains by far leaves of an effect says nothing of its size.
+    little = holds and float(made.removed.max()) < JUDGING.least_removed
+    least = JUDGING.gain if not holds else JUDGING.strained_gain if little else np.inf
+    if least < np.inf and _hull_strains(problem, found, rest, start, least):
         rigid = replace(problem, hull_spread=np.zeros_like(problem.hull_spread))
         stiff = held_out(rigid, folds, rest, start)
         over_stiff = compare_held_out(problem, folds, stiff, full)
@@ -358,8 +359,12 @@ def _beaten(picks: Floats, gains: Floats, by_name: Mapping[str, Floats]) -> floa
     return min(float(np.quantile(picks @ (gains - rival), 0.025)) for rival in rivals)
 
 
-def _hull_strains(problem: EstimationProblem, found: Fit, rest: Sequence[Candidate], start: Sequence[Floats]) -> bool:
+def _hull_strains(
+    problem: EstimationProblem, found: Fit, rest: Sequence[Candidate], start: Sequence[Floats], least: float
+) -> bool:
     """Tell whether the hull can stand in for a candidate only by being what nobody believes that it is.
+
+    By `least` in evidence [nat].
 
     A hull refitted to a fouled log explains it as well as fouling does, held-out stretches included; what speaks against it
     is that all its coefficients are then off together. Such a candidate is judged against the hull as it is in the model.
@@ -370,7 +375,7 @@ def _hull_strains(problem: EstimationProblem, found: Fit, rest: Sequence[Candida
         float(np.sum(((one.hull - problem.plain.hull)[free] / problem.hull_spread[free]) ** 2))
         for one in (without, found)
     ]
-    return without.evidence < found.evidence - JUDGING.gain and strains[0] > strains[1] + 2.0 * JUDGING.gain
+    return without.evidence < found.evidence - least and strains[0] > strains[1] + 2.0 * JUDGING.gain
 
 
 def _part(problem: EstimationProblem, windows: Windows) -> EstimationProblem:

@@ -263,6 +263,12 @@ class JudgingThresholds:
         "force of all actuators below which nothing that was found beside it is sure",
         "convention: one of several may have lost all of its force, and a vessel that is driven has most of it",
     )
+    strained_gain: float = threshold(
+        32.0,
+        "nat",
+        "evidence over a hull that strains from which an effect is weighed against the hull as it is in the model",
+        "derived: four times `gain`, as a quarter is left where the hull is believed to be twice as uncertain",
+    )
     slow_below_hz: float = threshold(
         0.2,
         "Hz",
