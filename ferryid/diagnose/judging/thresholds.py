@@ -267,7 +267,7 @@ class JudgingThresholds:
         32.0,
         "nat",
         "evidence over a hull that strains from which an effect is weighed against the hull as it is in the model",
-        "derived: four times `gain`, as a quarter is left where the hull is believed to be twice as uncertain",
+        "derived: four times `gain`, as a quarter of it is left under a prior of the hull that is twice as wide",
     )
     slow_below_hz: float = threshold(
         0.2,
