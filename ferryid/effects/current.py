@@ -61,6 +61,7 @@ EFFECT = Effect(
     regressor=regressor,
     changes_hull=True,
     negligible=EFFECTS.least_current,
+    passing_size=lambda profile: EFFECTS.passing_current,
     of_log=("north", "east"),
     turbulence=Turbulence(EFFECTS.current_turbulence, EFFECTS.least_current_std, EFFECTS.current_length),
     absent_in=("tank",),

@@ -180,8 +180,8 @@ class Effect:
         How far off its formula, and what the model has beside it, are believed to be: a standard deviation, as a share of how
         far a parameter is from neutral. A log tells of noise and coefficients only.
     passing_size
-        What both begins and ends within a log and is nearer to neutral than this is a hint: hull and formulas are as much off
-        in a part of the manoeuvres.
+        ``passing_size(profile)``: what both begins and ends within a log and is nearer to neutral than this, in the unit of
+        the first parameter, is a hint: hull and formulas are as much off in a part of the manoeuvres.
     changes_hull
         True where the effect changes how the hull's coefficients act: masses, damping, the flow.
     of_coefficients
@@ -252,7 +252,7 @@ class Effect:
     in_part: bool = False
     negligible: float = 0.0
     formula_error: float = EFFECTS.formula_error
-    passing_size: float = 0.0
+    passing_size: Callable[[Profile], float] = lambda profile: 0.0
     changes_hull: bool = False
     of_coefficients: bool = False
     piecewise: bool = False

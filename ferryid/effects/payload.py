@@ -117,6 +117,7 @@ EFFECT = Effect(
     cannot=cannot,
     onset=True,
     impulse=impulse,
+    passing_size=lambda profile: EFFECTS.passing_load * profile.hull.mass_kg,
     unreported=unreported,
     regressor=regressor,
     changes_hull=True,

@@ -138,6 +138,18 @@ class EffectThresholds:
         "smaller changes of a thruster's force that both begin and end within the log are hints",
         "convention: as much as `formula_error`, hull and formulas are off in a part of the manoeuvres",
     )
+    passing_load: float = threshold(
+        0.1,
+        "of the vessel's mass",
+        "lighter loads that both come and go within the log are hints",
+        "convention: as of `passing_gain`; a hull's masses are known to `hull_spread`",
+    )
+    passing_current: float = threshold(
+        0.05,
+        "m/s",
+        "weaker currents that both begin and end within the log are hints",
+        "convention: damping that is off by as much as `passing_gain`, at 0.5 m/s",
+    )
     longest_push: float = threshold(
         300.0,
         "s",

@@ -96,7 +96,7 @@ GAIN = Effect(
     scales=True,
     regressor=regressor,
     formula_error=EFFECTS.definition_error,
-    passing_size=EFFECTS.passing_gain,
+    passing_size=lambda profile: EFFECTS.passing_gain,
     by_row=True,
 )
 EFFECT = replace(GAIN, step=replace(GAIN, parameters_of=parameters_of_step, apply=apply_step, otherwise=otherwise))

@@ -153,10 +153,10 @@ def _figures(
     proof: Proof | None,
     removed: Mapping[str, float],
 ) -> Figures:
-    first = candidate.parameters[0]
-    passes = inf
-    if len(candidate.times) == 2 and candidate.effect.passing_size > 0.0:
-        passes = abs(reported.get(first.name, first.neutral) - first.neutral) / candidate.effect.passing_size
+    unit, passes = candidate.parameters[0].unit, inf
+    if len(candidate.times) == 2 and (size := candidate.effect.passing_size(problem.plain.measurements.profile)) > 0.0:
+        away = [reported.get(one.name, one.neutral) - one.neutral for one in candidate.parameters if one.unit == unit]
+        passes = float(np.linalg.norm(away)) / size
     shown = {} if proof is None else _lower_ends(proof)
     return Figures(
         kind="force",

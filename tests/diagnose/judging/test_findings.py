@@ -23,7 +23,7 @@ from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
 from ferryid.types import AXES
 from tests.diagnose.judging.test_campaign_posterior import survey
-from tests.diagnose.judging.test_held_out import WIND, candidate, sailed, trial_on
+from tests.diagnose.judging.test_held_out import FERRY, WIND, candidate, sailed, trial_on
 
 pytestmark = pytest.mark.slow
 
@@ -226,3 +226,25 @@ def test_a_delay_is_weighed_against_what_the_forces_tell(
     stands = replace(stands, fit=late, proof=replace(stands.proof, proofs=(gained,)))
     (claim,) = force_claims(problem, stands, problem.windows.measurements, hull_known=True)
     assert claim.figures.beyond_feedback == beyond
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "passes"),
+    [
+        # Both components of a current, and of a load its mass alone.
+        ("current", {"north": 0.03, "east": -0.04}, 1.0),
+        ("payload", {"mass": 0.05 * FERRY.hull.mass_kg, "x": 2.0}, 0.5),
+        ("thruster_gain", {"factor": 0.85}, 1.5),
+        ("wind", {"north": 0.1, "east": 0.1}, inf),
+    ],
+)
+def test_what_comes_and_goes_is_held_against_what_hull_and_formulas_may_be_off_by(
+    windy: tuple[EstimationProblem, Elimination], effect: str, values: dict[str, float], passes: float
+) -> None:
+    problem, _ = windy
+    lasts = candidate(effect, "thruster1" if effect == "thruster_gain" else None)
+    both = replace(lasts, onset_s=100.0, offset_s=300.0)
+    start = np.array([values.get(one.name, one.neutral) for one in lasts.parameters])
+    for one, expected in ((both, passes), (replace(both, offset_s=inf), inf), (lasts, inf)):
+        made = findings._figures(problem, one, start, values, None, {})
+        assert made.passes == pytest.approx(expected)
