@@ -134,9 +134,8 @@ def test_what_comes_and_goes_by_little_is_a_hint(
     """A wind of 2.5 m/s northwards, where 4 m/s or 1 m/s are little."""
     problem, stands = windy
     (blown,) = stands.fit.candidates
-    candidate = replace(
-        blown, effect=replace(blown.effect, passing_size=passing, onset=True), onset_s=onset_s, offset_s=offset_s
-    )
+    effect = replace(blown.effect, passing_size=lambda profile: passing, onset=True)
+    candidate = replace(blown, effect=effect, onset_s=onset_s, offset_s=offset_s)
     made = replace(stands.fit, candidates=(candidate,), values=(np.array([2.5, 0.0, 1.0, 1.0, 1.0]),))
     finding, notes = judged_by_rules(problem, replace(stands, fit=made))
     assert finding.sure == sure
