@@ -21,6 +21,7 @@ from ferryid.effects.wording import listed
 from ferryid.errors import FerryIdError
 from ferryid.models import Model
 from ferryid.side_by_side import over
+from ferryid.signals.artificial import NO_RECORDING
 from ferryid.signals.order_of_time import dated
 from ferryid.types import RunContext
 from ferryid.vessel.profile import Profile
@@ -143,7 +144,7 @@ def sort_out(logs: Sequence[AveragedLog], whose: str) -> tuple[list[AveragedLog]
     artificial = {one.path: why for one in logs if (why := _simulated(one))}
     if artificial and len(artificial) == len(logs):
         return list(logs), [
-            f"{path} is no recording of a vessel: {why}. What is found in it is that simulator's or filter's, not a vessel's."
+            f"{path} {NO_RECORDING}: {why}. What is found in it belongs to whatever made it, and not to a vessel."
             for path, why in artificial.items()
         ]
     notes = [

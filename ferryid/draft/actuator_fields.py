@@ -267,6 +267,12 @@ def shared_topics(topics: Sequence[Topic]) -> list[SharedTopic]:
     return found
 
 
+def constant(shared: SharedTopic, samples: Samples) -> bool:
+    """Tell whether what a topic carries of several actuators is one and the same value."""
+    known = (shared.topic, shared.value) in samples.columns
+    return known and np.unique(samples.raw(shared.topic, shared.value)).size == 1
+
+
 def parted(shared: SharedTopic, samples: Samples) -> tuple[list[ActuatorField], Samples]:
     """Return the actuators on a topic that carries several, and the samples with the messages of each apart."""
     if any((shared.topic, path) not in samples.columns for path in (*shared.selectors, shared.value)):

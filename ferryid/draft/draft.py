@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ferryid.draft.actuator_fields import actuator_fields, parted, shared_topics
+from ferryid.draft.actuator_fields import actuator_fields, constant, parted, shared_topics
 from ferryid.draft.actuators import UNKNOWN_ORDER, DraftedActuator, drafted_actuators
 from ferryid.draft.autopilots import Orders, autopilot_fields, autopilot_groups, changing, orders, with_frames
 from ferryid.draft.fields import FieldGroup, navigation_groups
@@ -135,8 +135,7 @@ def draft_profile(log: str | Path, like: Profile | None = None, ranges: TimeRang
     actuators = drafted_actuators(fields, samples, motion, driven.placements)
     if not actuators:
         still = [] if changing(looked_for, samples) else [f"{one.topic}: {one.path}" for one in looked_for]
-        # What a topic carries of several actuators is parted by what changes.
-        still = still or [f"{one.topic}: {one.value}" for one in shared]
+        still = still or [f"{one.topic}: {one.value}" for one in shared if constant(one, samples)]
         what = (
             f"nothing that looks like an actuator ever changes, found {_listed(still)}"
             if still

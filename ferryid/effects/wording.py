@@ -52,6 +52,10 @@ ALL_THRUSTERS = "all"
 """Instance of a change of force that all actuators have in common, as by a weak battery."""
 
 
+IS_A_HINT = " is a hint: "
+"""What stands in a note between a finding and the reason that makes a hint of it."""
+
+
 def uncapitalised(text: str) -> str:
     """Return a title or sentence as it goes on within another."""
     return text[:1].lower() + text[1:]

@@ -28,6 +28,7 @@ from ferryid.report.drawings import NONE, Drawings
 from ferryid.report.html import template
 from ferryid.report.interactive import STATIC, Interactive
 from ferryid.report.left_out import left_out_table
+from ferryid.signals.artificial import NO_RECORDING
 from ferryid.signals.track import LeftOut
 from ferryid.types import AXES, Floats
 
@@ -113,11 +114,16 @@ def _several_as_text(diagnoses: Sequence[Diagnosis]) -> str:
     shared = diagnosis_words.notes_of_all(diagnoses)
     common = diagnosis_words.findings_of_all(diagnoses)
     together = second_sources.of_all(diagnoses)
+    artificial = [note for note in shared if NO_RECORDING in note]
+    blocks += [_folded(f"note: {note}") for note in artificial]
     if common:
         lines = [f"{diagnosis_words.where_common(diagnoses, common)}:", *_listed(common)]
         blocks.append("\n".join(_folded(line) for line in lines))
     blocks += campaign.text_tables(diagnoses)
-    about_all = [*shared, *likeness.notes(diagnoses[0].likeness_of_all, "these logs together")]
+    about_all = [
+        *(note for note in shared if note not in artificial),
+        *likeness.notes(diagnoses[0].likeness_of_all, "these logs together"),
+    ]
     if about_all:
         blocks.append("\n".join(_folded(f"note: {note}") for note in about_all))
     if together and (instruments := second_sources.lines(together)):

@@ -11,7 +11,7 @@ from ferryid.counts import counted
 from ferryid.diagnose import JUDGING, UNKNOWN, Diagnosis, Estimate, Finding, worse_axes
 from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS
-from ferryid.effects.wording import listed, parameter_word, timed, titled, uncapitalised
+from ferryid.effects.wording import IS_A_HINT, listed, parameter_word, timed, titled, uncapitalised
 from ferryid.report import least_sizes
 from ferryid.report.diagnosis_errors import fitted, ratio_of
 from ferryid.types import AXES
@@ -58,8 +58,6 @@ UNRECORDED = "unrecorded_force"
 """A force that the records of the actuators lack: no fault of a sensor, and nothing that could be corrected."""
 NOT_CORRECTED = "not corrected"
 """What the sentence of a sensor fault says that is told and left as it is, as a clock offset in a short log."""
-IS_A_HINT = " is a hint: "
-"""What stands in a note between a finding and the reason that makes a hint of it."""
 APART = 0.1
 """Share of the squared force error by which a finding alone may remove more than all do, before the headline says why."""
 

@@ -25,8 +25,8 @@ SIMULATORS = (
     "webots_ros/",
 )
 """Beginnings of the names of messages that simulators alone send."""
-NO_RECORDING = "It is no recording of a vessel"
-"""Beginning of what is told of such a log."""
+NO_RECORDING = "is no recording of a vessel"
+"""What is told of such a log."""
 VELOCITIES = (("u", "v"), ("vel_N", "vel_E"))
 ALONG = (
     "each step of its positions points along the heading to the last digit, as if no vessel drifted in a turn: they are "

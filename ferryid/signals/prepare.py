@@ -73,7 +73,7 @@ def doubts_of(recording: Recording, track: Track, *, origin: bool = True) -> tup
     why = artificial(recording) if origin else ""
     empty = [name for name in POSE if name in track.columns and not np.isfinite(track.columns[name]).any()]
     return (
-        *((f"{NO_RECORDING}: {why}.",) if why else ()),
+        *((f"It {NO_RECORDING}: {why}.",) if why else ()),
         *(doubt.says for doubt in track.doubts),
         *(repair for repair in track.repairs if repair == SWAY_NOT_MEASURED),
         *recording.orders_for_feedback,

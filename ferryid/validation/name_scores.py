@@ -9,7 +9,7 @@ from typing import ClassVar
 from scipy.stats import beta
 
 from ferryid.effects import effects
-from ferryid.effects.wording import titled
+from ferryid.effects.wording import IS_A_HINT, titled
 from ferryid.json_record import Record
 from ferryid.validation.records import UNKNOWN, CaseResult, Finding, Key
 
@@ -22,8 +22,8 @@ LEVEL = 0.95
 HULL = "hull_parameters"
 NOT_CONFIRMED, NO_HULL_MODEL = "not confirmed: ", "The profile has no hull model"
 """How a finding of a campaign says why it is a hint, and how the note begins that makes findings of a single log hints."""
-IS_A_HINT, DROPPED = " is a hint: ", " considered, but dropped: "
-"""What stands in a note between an effect and why it is a hint, or is none."""
+DROPPED = " considered, but dropped: "
+"""What stands in a note between an effect and why it is none."""
 
 
 @dataclass(frozen=True)

@@ -235,6 +235,7 @@ def test_what_acts_last_does_the_same_first(last: Effect) -> None:
     one = force_model(flow=True, load=True, damped=True)
     own = last.parameters_of(FERRY)
     values = np.array([each.neutral + 0.3 * each.size for each in own])
+    assert np.abs(as_measured(last.act(one, values, None)) - as_measured(one)).max() > 1e-6
     tried = 0
     for other in effects().values():
         # Masses that are off are grown in shallow water, and by a load, as they are then.
@@ -246,7 +247,6 @@ def test_what_acts_last_does_the_same_first(last: Effect) -> None:
         after = last.act(other.act(one, moved, instance), values, None)
         before = other.act(last.act(one, values, None), moved, instance)
         np.testing.assert_allclose(as_measured(after), as_measured(before), rtol=1e-9, atol=1e-9, err_msg=other.id)
-        assert np.abs(as_measured(after) - as_measured(one)).max() > 1e-6
         tried += 1
     assert tried > 5
 

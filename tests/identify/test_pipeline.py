@@ -91,7 +91,7 @@ def test_warnings_of_the_model_come_before_those_of_single_logs(
 
 @pytest.mark.slow
 def test_that_a_log_is_no_recording_comes_before_all(monkeypatch: pytest.MonkeyPatch, opened: Opened) -> None:
-    doubt = Doubt(f"{NO_RECORDING}: it is simulated.", certain=False)
+    doubt = Doubt(f"It {NO_RECORDING}: it is simulated.", certain=False)
     monkeypatch.setattr(pipeline, "free_run_warnings", lambda *_: ("Run free for 5 s it turns in circles.",))
     result = fitted(monkeypatch, replace(opened, track=replace(opened.track, doubts=(doubt,))))
     assert result.warnings[0].endswith(doubt.says)

@@ -19,7 +19,7 @@ from ferryid.diagnose.judging.experiment_design import CALM, HULL_FIRST, fitting
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
-from ferryid.effects.wording import listed, titled
+from ferryid.effects.wording import IS_A_HINT, listed, titled
 from ferryid.types import AXES
 
 
@@ -90,7 +90,7 @@ def title_of(finding: Finding) -> str:
 
 
 def _because(finding: Finding, why: str) -> Outcome:
-    return lowered(finding), f"{title_of(finding)} is a hint: {why}."
+    return lowered(finding), f"{title_of(finding)}{IS_A_HINT}{why}."
 
 
 @rule()

@@ -97,7 +97,8 @@ def idle_actuators(problem: EstimationProblem, kept: Fit) -> str:
         return ""
     return (
         f"beside it, the actuators are left with {100.0 * left / recorded:.0f} % of their recorded force: the motion does not "
-        "follow that, as where they were not engaged, or their signals, directions, units or times are not those of the vessel"
+        "follow it, as happens where they were not engaged, or their signals, directions, units or times are not those of the "
+        "vessel"
     )
 
 

@@ -130,9 +130,7 @@ def _force_claim(
         figures = replace(
             figures,
             sets_in=sets_in(problem, kept, i),
-            beyond_hull=beyond_any_hull(
-                problem, kept, i, library, max((one.gain for one in standing.rivals), default=-inf)
-            ),
+            beyond_hull=beyond_any_hull(problem, kept, i, library, standing.nearest),
         )
     return Claim(finding, figures)
 
@@ -155,7 +153,9 @@ def _figures(
 ) -> Figures:
     unit, passes = candidate.parameters[0].unit, inf
     if len(candidate.times) == 2 and (size := candidate.effect.passing_size(problem.plain.measurements.profile)) > 0.0:
-        away = [reported.get(one.name, one.neutral) - one.neutral for one in candidate.parameters if one.unit == unit]
+        # The second level of a step is that of all other times.
+        every = candidate.parameters[:1] if candidate.is_step else candidate.parameters
+        away = [reported.get(one.name, one.neutral) - one.neutral for one in every if one.unit == unit]
         passes = float(np.linalg.norm(away)) / size
     shown = {} if proof is None else _lower_ends(proof)
     return Figures(

@@ -327,15 +327,17 @@ def _proof(problem: EstimationProblem, folds: Folds, found: Fit, full: HeldOut, 
     if least < np.inf and _hull_strains(problem, found, rest, start, least):
         rigid = replace(problem, hull_spread=np.zeros_like(problem.hull_spread))
         stiff = held_out(rigid, folds, rest, start)
-        over_stiff = compare_held_out(problem, folds, stiff, full)
         # The same force late, or on a mirrored heading, has to be worse there too.
         own = held_out(rigid, folds, found.candidates, found.values)
+        # What held beside a refitted hull has to do so on that of the model, without what the refit adds.
+        judged = own if holds else full
+        over_stiff = compare_held_out(problem, folds, stiff, judged)
         gains, by_stiff = _gains(problem, folds, stiff.gaps, own.gaps), gains_of_placebos(rigid, stiff)
         beyond = _beaten(picks, gains, by_stiff)
         theirs = {name: float(one.sum()) for name, one in by_stiff.items()}
         held = over_stiff.score_low > 0.0 and beyond > 0.0 and not _matched(over_stiff.score, theirs, alike)
         if held or not holds:
-            without, made, scores, beaten, holds = stiff, over_stiff, theirs, beyond, held
+            without, full, made, scores, beaten, holds = stiff, judged, over_stiff, theirs, beyond, held
     return Proof(candidate, made, scores, beaten, holds, free_runs(problem, folds, without.fits, full.fits))
 
 
@@ -364,7 +366,7 @@ def _hull_strains(
 ) -> bool:
     """Tell whether the hull can stand in for a candidate only by being what nobody believes that it is.
 
-    By `least` in evidence [nat].
+    By `least` both in evidence and in what the prior of its coefficients costs [nat].
 
     A hull refitted to a fouled log explains it as well as fouling does, held-out stretches included; what speaks against it
     is that all its coefficients are then off together. Such a candidate is judged against the hull as it is in the model.
@@ -375,7 +377,7 @@ def _hull_strains(
         float(np.sum(((one.hull - problem.plain.hull)[free] / problem.hull_spread[free]) ** 2))
         for one in (without, found)
     ]
-    return without.evidence < found.evidence - least and strains[0] > strains[1] + 2.0 * JUDGING.gain
+    return without.evidence < found.evidence - least and strains[0] > strains[1] + 2.0 * least
 
 
 def _part(problem: EstimationProblem, windows: Windows) -> EstimationProblem:

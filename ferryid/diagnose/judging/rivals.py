@@ -59,14 +59,22 @@ class RivalComparison:
     rivals
         The best first.
     probability
-        Of the candidate, over its rivals and none of them.
+        Of the candidate, over its rivals and none of them; see `without_companions`.
     evidence
         Of the candidate over none of them [nat].
+    companions
+        Those that act beside the candidate, and are no rivals.
     """
 
     rivals: tuple[RivalFit, ...]
     probability: float
     evidence: float = 0.0
+    companions: tuple[RivalFit, ...] = ()
+
+    @property
+    def nearest(self) -> float:
+        """Evidence of the best in the candidate's place over that of the candidate [nat], -inf where there is none."""
+        return max((one.gain for one in (*self.rivals, *self.companions)), default=-inf)
 
     def unresolved(self, candidate: Candidate) -> tuple[str, ...]:
         """Return the ids of effects that cannot be told from a candidate: near in evidence, or another shape that is alike."""
@@ -186,18 +194,22 @@ def _beside(problem: EstimationProblem, kept: Fit, index: int, rival: Fit) -> Fi
     candidate, values = kept.candidates[index], kept.values[index]
     # The rival of a step stands beside its level all along.
     others = [k for k, one in enumerate(rival.candidates) if one.key != candidate.key]
-    return fit(
-        problem,
-        [*(rival.candidates[k] for k in others), candidate],
-        [*(rival.values[k] for k in others), values],
-    )
+    candidates = [*(rival.candidates[k] for k in others), candidate]
+    start = [*(rival.values[k] for k in others), values]
+    both = fit(problem, candidates, start)
+    if not any(one.effect.profiled for one in candidates):
+        return both
+    # As in `without`: from the profile's hull the way may end on a lower top.
+    near = fit(problem, candidates, start, begin=starting_point(problem, rival))
+    return max(both, near, key=lambda one: one.evidence)
 
 
 def without_companions(problem: EstimationProblem, kept: Fit, index: int, standing: RivalComparison) -> RivalComparison:
     """Return how a candidate stands where a rival may act beside it as well as in its place.
 
     One beside which the candidate is still more likely than not is no rival: both act, whether or not the other has a name. The
-    probability is that of all hypotheses that hold the candidate: it alone, and beside each of the rivals that are near.
+    probability is that of all hypotheses that hold the candidate, alone and beside each of the rivals that are near, among
+    these and those that hold none, one or two of the rivals.
     """
     candidate = kept.candidates[index]
     near = [
@@ -207,14 +219,22 @@ def without_companions(problem: EstimationProblem, kept: Fit, index: int, standi
     ]
     if not near:
         return standing
+    last = len(near[0].fit.candidates) - 1
     both = over(lambda one: _beside(problem, kept, index, one.fit).evidence, near)
+    pairs = over(lambda pair: _beside(problem, pair[0].fit, last, pair[1].fit).evidence, list(combinations(near, 2)))
     held = [0.0, *(one - kept.evidence - INFERENCE.prior_odds for one in both)]
-    others = [INFERENCE.prior_odds - standing.evidence, *(one.gain for one in standing.rivals)]
+    others = [INFERENCE.prior_odds - standing.evidence]
+    others += [one.gain for one in standing.rivals if not any(one is each for each in near)]
+    # Over the candidate alone: what it and some coefficients come to together is among the hypotheses that hold it.
+    others += [one.fit.evidence - kept.evidence for one in near]
+    others += [one - kept.evidence - INFERENCE.prior_odds for one in pairs]
     top = max(*held, *others)
     ours, theirs = (sum(exp(one - top) for one in some) for some in (held, others))
-    companions = [one for one, pair in zip(near, both, strict=True) if pair - one.fit.evidence > INFERENCE.prior_odds]
+    companions = tuple(
+        one for one, pair in zip(near, both, strict=True) if pair - one.fit.evidence > INFERENCE.prior_odds
+    )
     rivals = tuple(one for one in standing.rivals if not any(one is each for each in companions))
-    return replace(standing, rivals=rivals, probability=ours / (ours + theirs))
+    return replace(standing, rivals=rivals, companions=companions, probability=ours / (ours + theirs))
 
 
 def _may_stand_in(problem: EstimationProblem, beside: Linearisation, candidate: Candidate, other: Candidate) -> bool:

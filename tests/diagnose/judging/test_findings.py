@@ -235,13 +235,16 @@ def test_a_delay_is_weighed_against_what_the_forces_tell(
         ("payload", {"mass": 0.05 * FERRY.hull.mass_kg, "x": 2.0}, 0.5),
         ("thruster_gain", {"factor": 0.85}, 1.5),
         ("wind", {"north": 0.1, "east": 0.1}, inf),
+        # Of a step the level while it lasts: the other is that of all other times.
+        ("step", {"factor": 0.85, "otherwise": 0.4}, 1.5),
     ],
 )
 def test_what_comes_and_goes_is_held_against_what_hull_and_formulas_may_be_off_by(
     windy: tuple[EstimationProblem, Elimination], effect: str, values: dict[str, float], passes: float
 ) -> None:
     problem, _ = windy
-    lasts = candidate(effect, "thruster1" if effect == "thruster_gain" else None)
+    gain = candidate("thruster_gain", "thruster1")
+    lasts = {"thruster_gain": gain, "step": gain.as_step(FERRY)}.get(effect) or candidate(effect)
     both = replace(lasts, onset_s=100.0, offset_s=300.0)
     start = np.array([values.get(one.name, one.neutral) for one in lasts.parameters])
     for one, expected in ((both, passes), (replace(both, offset_s=inf), inf), (lasts, inf)):
