@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from ferryid.compiled import borrowing, compiled
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted_force_model
 from ferryid.diagnose.inference.folds import Folds, by_block, draws
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
-from ferryid.effects.equations_of_motion import acceleration_in
-from ferryid.effects.force_model import ForceModel, Measurements, check_rows
+from ferryid.effects.force_model import Measurements
+from ferryid.effects.free_motion import run_freely
 from ferryid.types import Floats, Ints
 
 DIVERGED = 1e6
@@ -72,7 +70,8 @@ def free_runs(problem: EstimationProblem, folds: Folds, before: Sequence[Fit], a
         if own.size == 0:
             continue
         for which, fits in enumerate((before, after)):
-            path = run_freely(fitted_force_model(problem.plain, fits[k]), starts[own], stride, int(steps[-1]))
+            model = fitted_force_model(problem.plain, fits[k])
+            path = _stopped(run_freely(model, starts[own], stride, int(steps[-1]), DIVERGED))
             for h, count in enumerate(steps):
                 rows = starts[own] + stride * int(count)
                 inside = rows <= last[own]
@@ -97,75 +96,10 @@ def _starts(windows: Windows, folds: Folds, shortest: int) -> tuple[Ints, Ints, 
     return np.array(starts, dtype=np.int64), np.array(last, dtype=np.int64), np.array(block, dtype=np.int64)
 
 
-def run_freely(force_model: ForceModel, starts: Ints, stride: int, steps: int) -> Floats:
-    """Return states that begin in some rows as measured: place, heading and velocity over ground, shape (steps + 1, s, 6).
-
-    Heun's rule with steps of `stride` rows and the forces of these; the last row's beyond it. What diverges is NaN.
-    """
-    measurements = force_model.measurements
-    check_rows(force_model)
-    begin = np.hstack([np.nan_to_num(measurements.eta[starts]), measurements.nu[starts]])
-    flow = np.empty((0, 2)) if force_model.flow is None else force_model.flow
-    load = np.empty((0, 5)) if force_model.load is None else force_model.load
-    factor = np.empty(0) if force_model.damping_factor is None else force_model.damping_factor
-    every = (force_model.hull, force_model.parts, force_model.external, flow, load, factor)
-    return _run(begin, starts, stride, steps, stride * measurements.step_s, *map(np.ascontiguousarray, every))
-
-
-@borrowing
-def _rate(
-    row: int,
-    state: Floats,
-    hull: Floats,
-    parts: Floats,
-    external: Floats,
-    flow: Floats,
-    load: Floats,
-    factor: Floats,
-    out: Floats,
-) -> None:
-    """Fill in the derivative of a state with the forces of a row, shape (6,) each."""
-    c, s = math.cos(state[2]), math.sin(state[2])
-    u, v, r = state[3], state[4], state[5]
-    north, east = (flow[row, 0], flow[row, 1]) if flow.shape[0] > 0 else (0.0, 0.0)
-    ahead, starboard = c * north + s * east, c * east - s * north
-    a, b, turning = acceleration_in(row, u - ahead, v - starboard, r, hull, parts, external, load, factor)
-    out[0], out[1], out[2] = c * u - s * v, s * u + c * v, r
-    # The body frame turns through the water.
-    out[3], out[4], out[5] = a + r * starboard, b - r * ahead, turning
-
-
-@compiled
-def _run(
-    begin: Floats,
-    starts: Ints,
-    stride: int,
-    steps: int,
-    step_s: float,
-    hull: Floats,
-    parts: Floats,
-    external: Floats,
-    flow: Floats,
-    load: Floats,
-    factor: Floats,
-) -> Floats:
-    path = np.empty((steps + 1, begin.shape[0], 6))
-    last = external.shape[0] - 1
-    rate, after, moved = np.empty(6), np.empty(6), np.empty(6)
-    for i in range(begin.shape[0]):
-        path[0, i] = begin[i]
-        _rate(min(starts[i], last), begin[i], hull, parts, external, flow, load, factor, rate)
-        for k in range(steps):
-            row = min(starts[i] + (k + 1) * stride, last)
-            for j in range(6):
-                moved[j] = path[k, i, j] + step_s * rate[j]
-            _rate(row, moved, hull, parts, external, flow, load, factor, after)
-            for j in range(6):
-                new = path[k, i, j] + 0.5 * step_s * (rate[j] + after[j])
-                # What diverges is stopped, and left out where errors are judged.
-                path[k + 1, i, j] = new if abs(new) < DIVERGED else math.nan
-            _rate(row, path[k + 1, i], hull, parts, external, flow, load, factor, rate)
-    return path
+def _stopped(path: Floats) -> Floats:
+    """Return states of runs, shape (steps + 1, s, 6), without those from where a run diverged on: they are left out."""
+    diverged = np.logical_or.accumulate(~(np.abs(path) < DIVERGED).all(axis=2), axis=0)
+    return np.where(diverged[:, :, None], np.nan, path)
 
 
 def _error(measurements: Measurements, rows: Ints, state: Floats) -> Floats:

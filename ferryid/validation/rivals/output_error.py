@@ -10,19 +10,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import cos, log, sin
+from math import log
 from pathlib import Path
 
 import numpy as np
 
 from ferryid.cached import cached_property
-from ferryid.compiled import borrowing, compiled
 from ferryid.counts import counted
 from ferryid.diagnose import Estimate
 from ferryid.effects import Effect, effects
 from ferryid.effects.effect import HELD
-from ferryid.effects.equations_of_motion import acceleration_in
 from ferryid.effects.force_model import COEFFICIENTS, ForceModel, Measurements, hull_of
+from ferryid.effects.free_motion import run_freely
 from ferryid.effects.hull_spread import default_hull_spread
 from ferryid.effects.measurements import hull_force_model
 from ferryid.errors import FerryIdError
@@ -100,92 +99,10 @@ class Segments:
     def left(self, force_model: ForceModel) -> Floats:
         """Return what a force model leaves of every node and channel, over the usual error of the channel, shape (m,)."""
         seen = force_model.measurements
-        n, nothing = len(seen.t), np.empty((0, 0))
-        flow = nothing if force_model.flow is None else force_model.flow
-        load = nothing if force_model.load is None else force_model.load
-        factor = np.empty(0) if force_model.damping_factor is None else force_model.damping_factor
-        given = (seen.eta, seen.nu, force_model.parts, force_model.external, flow, load, factor)
-        # Compiled code does not look where an array ends.
-        if {len(one) for one in given if len(one)} != {n}:
-            raise ValueError(f"a force model of {counted(n, 'row')} has parts of other lengths")
-        eta, nu, *others = map(np.ascontiguousarray, given)
-        states = _integrated(
-            self.starts, self.stride, self.steps, self.stride * seen.step_s, eta, nu, force_model.hull, *others
-        )
+        states = run_freely(force_model, self.starts, self.stride, self.steps, LARGEST)[1:]
         rows = self.starts + self.stride * np.arange(1, self.steps + 1)[:, None]
-        left = (np.concatenate([eta[rows], nu[rows]], axis=2) - states) * self.weights
+        left = (np.concatenate([seen.eta[rows], seen.nu[rows]], axis=2) - states) * self.weights
         return np.asarray(left[:, :, self.weights > 0.0].ravel())
-
-
-@compiled
-def _integrated(
-    starts: Ints,
-    stride: int,
-    steps: int,
-    dt: float,
-    eta: Floats,
-    nu: Floats,
-    hull: Floats,
-    parts: Floats,
-    external: Floats,
-    flow: Floats,
-    load: Floats,
-    factor: Floats,
-) -> Floats:
-    """Integrate from every start with Heun's method; return pose and velocities at the nodes, shape (steps, s, 6).
-
-    Forces are those of a force model in the rows; what it has not got is an array without rows. `flow` is north and east.
-    """
-    out = np.empty((steps, len(starts), 6))
-    state, rate, there, after = np.empty(6), np.empty(6), np.empty(6), np.empty(6)
-    for j in range(len(starts)):
-        row = starts[j]
-        state[:3], state[3:] = eta[row], nu[row]
-        _rates(row, state, hull, parts, external, flow, load, factor, rate)
-        for k in range(steps):
-            row += stride
-            for c in range(6):
-                there[c] = state[c] + dt * rate[c]
-            _rates(row, there, hull, parts, external, flow, load, factor, after)
-            for c in range(6):
-                value = state[c] + 0.5 * dt * (rate[c] + after[c])
-                # Not by min and max, of which a value that is not a number would come as a bound.
-                if value > LARGEST:
-                    value = LARGEST
-                elif value < -LARGEST:
-                    value = -LARGEST
-                state[c] = value
-                out[k, j, c] = value
-            _rates(row, state, hull, parts, external, flow, load, factor, rate)
-    return out
-
-
-@borrowing
-def _rates(
-    i: int,
-    state: Floats,
-    hull: Floats,
-    parts: Floats,
-    external: Floats,
-    flow: Floats,
-    load: Floats,
-    factor: Floats,
-    out: Floats,
-) -> None:
-    """Fill in the derivatives of pose and velocities under the forces of a row, shape (6,).
-
-    See `ferryid.effects.equations_of_motion.accelerations`.
-    """
-    cosine, sine = cos(state[2]), sin(state[2])
-    u, v, r = state[3], state[4], state[5]
-    along, across = 0.0, 0.0
-    if flow.shape[0] > 0:
-        along = cosine * flow[i, 0] + sine * flow[i, 1]
-        across = cosine * flow[i, 1] - sine * flow[i, 0]
-    a, b, c = acceleration_in(i, u - along, v - across, r, hull, parts, external, load, factor)
-    out[0], out[1], out[2] = cosine * u - sine * v, sine * u + cosine * v, r
-    # The body frame turns through the water.
-    out[3], out[4], out[5] = a + r * across, b - r * along, c
 
 
 def diagnose(log: str, profile: Profile, out: Path) -> tuple[Finding, ...]:
