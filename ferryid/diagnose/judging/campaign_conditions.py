@@ -42,7 +42,7 @@ from ferryid.diagnose.judging.campaign_evidence import (
     without_conditions,
 )
 from ferryid.diagnose.judging.claims import Claim, Figures
-from ferryid.diagnose.judging.credibility import felt, interval_doubt, unfelt, value_doubt
+from ferryid.diagnose.judging.credibility import felt, interval_doubt, unfelt, value_doubt, worsened
 from ferryid.diagnose.judging.experiment_design import manoeuvre
 from ferryid.diagnose.judging.figure_data import axis_of_errors, error_columns
 from ferryid.diagnose.judging.finding import Finding, Rival
@@ -204,12 +204,8 @@ class ConditionTest:
             return f"a {listed(self.outdone, 'or')}, which cannot be true, explains more"
         if self.unresolved:
             return f"a {listed([effects()[one].title.lower() for one in self.unresolved])} explains about as much"
-        improvement = _improvement(self)
-        worst = int(np.argmin(improvement))
-        if improvement[worst] < -JUDGING.worsening:
-            share = -100.0 * float(improvement[worst])
-            return f"it makes the held-out squared force error of the logs in {AXES[worst]} {share:.0f} % larger"
-        return unfelt(self.felt.max(axis=0))
+        improvement = dict(zip(AXES, _improvement(self).tolist(), strict=True))
+        return worsened(improvement) or unfelt(self.felt.max(axis=0))
 
     @cached_property
     def felt(self) -> Floats:

@@ -21,7 +21,7 @@ from ferryid.diagnose.inference.group_differences import compare_estimated, scat
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.campaign_evidence import Gain, held_out_loss
-from ferryid.diagnose.judging.credibility import felt, interval_doubt, unfelt, value_doubt
+from ferryid.diagnose.judging.credibility import felt, interval_doubt, unfelt, value_doubt, worsened
 from ferryid.diagnose.judging.experiment_design import manoeuvre
 from ferryid.diagnose.judging.finding import Finding, Rival
 from ferryid.diagnose.judging.rivals import redundant_shape, same_curve
@@ -113,7 +113,6 @@ class PropertyTest:
     def doubt(self) -> str:
         """Why it is not confirmed, as the end of a sentence; empty where it is."""
         held, logs = self.holding
-        worst = int(np.argmin(self.improvement))
         if self.evidence < INFERENCE.prior_odds:
             return weak_evidence(self.evidence, INFERENCE.prior_odds)
         if self.gain.low <= 0.0:
@@ -122,9 +121,8 @@ class PropertyTest:
             return f"only {held} of {counted(logs, 'log')} are predicted better with it on held-out stretches"
         if self.credibility:
             return self.credibility
-        if self.improvement[worst] < -JUDGING.worsening:
-            share = -100.0 * float(self.improvement[worst])
-            return f"it makes the held-out squared force error in {AXES[worst]} {share:.0f} % larger"
+        if harm := worsened(dict(zip(AXES, self.improvement.tolist(), strict=True))):
+            return harm
         if self.improvement.max() < JUDGING.least_removed and not self.alike_in_logs:
             return (
                 f"on no axis does it remove {100.0 * JUDGING.least_removed:.0f} % of the held-out squared force error"

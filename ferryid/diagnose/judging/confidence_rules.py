@@ -15,6 +15,7 @@ from ferryid.counts import counted
 from ferryid.diagnose.inference.feedback import OUT_OF_STEP
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.claims import Claim, Figures, Key, LogFigures
+from ferryid.diagnose.judging.credibility import worsened
 from ferryid.diagnose.judging.experiment_design import CALM, HULL_FIRST, fitting
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.thresholds import JUDGING
@@ -217,20 +218,13 @@ def passes_by_little(finding: Finding, context: Context, threshold: float) -> Ou
     return _because(finding, "it comes and goes, by less than hull and formulas may be off in a part of the manoeuvres")
 
 
-@rule(JUDGING.worsening, "of the held-out squared force error")
-def worse_on_an_axis(finding: Finding, context: Context, threshold: float) -> Outcome:
-    """Lower what makes an axis worse by more than this, over the log or while it acts; less may be chance."""
-    change = {
-        axis: min(shares[axis] for shares in (context.own.removed, finding.improvement) if axis in shares)
-        for axis in AXES
-        if axis in context.own.removed or axis in finding.improvement
-    }
-    worst = min(change, key=lambda axis: change[axis], default="")
-    if not worst or change[worst] >= -threshold or context.own.kind != "force":
+@rule()
+def worse_on_an_axis(finding: Finding, context: Context, _threshold: float) -> Outcome:
+    """Lower what makes an axis worse, over the log or while it acts, and not others better by far more."""
+    if context.own.kind != "force":
         return finding, ""
-    return _because(
-        finding, f"it makes the held-out squared force error in {worst} {-100.0 * change[worst]:.0f} % larger"
-    )
+    why = worsened(context.own.removed) or worsened(finding.improvement)
+    return _because(finding, why) if why else (finding, "")
 
 
 @rule(JUDGING.worsening, "of the held-out squared force error")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import log
 
 import numpy as np
 from scipy.special import chdtri, ndtri  # scipy.stats takes a third of a second to import
@@ -20,6 +21,8 @@ from ferryid.identify import inertia_checks
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
 
+NOTHING_LEFT = 1e-12
+"""Of a squared error, where rounding alone is left of it."""
 IN_THE_HULL = "hull_parameters"
 """The effect that is nothing but other coefficients of the hull: it becomes these."""
 
@@ -213,6 +216,28 @@ def _given(covariance: Floats, wanted: Sequence[int], known: Sequence[int]) -> F
         return own
     shared = covariance[np.ix_(wanted, known)]
     return np.asarray(own - shared @ np.linalg.solve(covariance[np.ix_(known, known)], shared.T))
+
+
+def worsened(removed: Mapping[str, float]) -> str:
+    """Return on which axis predictions get worse, as the end of a sentence; empty where none does, or for far better others.
+
+    Physics that acts improves what it acts on, and hardly harms the rest. Its formula may be off on an axis where little of it
+    acts: what counts is by how much the squared error of an axis grows beside how much those of the others shrink, each as the
+    logarithm of a ratio, so that it does not matter how much of a force an axis has.
+
+    Parameters
+    ----------
+    removed
+        Share of the held-out squared force error that a finding removes, by axis; below zero where it grows.
+    """
+    worst = min(removed, key=lambda axis: removed[axis], default="")
+    if not worst or removed[worst] >= -JUDGING.worsening:
+        return ""
+    shrinks = [-log(max(1.0 - share, NOTHING_LEFT)) for share in removed.values()]
+    gained, lost = (sum(max(sign * one, 0.0) for one in shrinks) for sign in (1.0, -1.0))
+    if lost <= JUDGING.worsening_over_gain * gained:
+        return ""
+    return f"it makes the held-out squared force error in {worst} {-100.0 * removed[worst]:.0f} % larger"
 
 
 def felt(made: CampaignFit, common: Floats, own: Floats) -> Floats:

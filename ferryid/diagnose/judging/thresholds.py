@@ -251,6 +251,13 @@ class JudgingThresholds:
         "tuned on cases of `ferryid prove`: the rule is from cases in which a finding made one axis far worse; 20 % "
         "stands for more than chance",
     )
+    worsening_over_gain: float = threshold(
+        0.5,
+        "of the logarithms",
+        "growth of the squared errors of some axes, over how much those of the others shrink, from which that counts",
+        "convention: twice as much good as harm; after cases of `ferryid prove` in which a push and a delay, found to some per "
+        "cent, removed up to 99 % of one axis's error and made another's, near its noise, a third larger",
+    )
     least_removed: float = threshold(
         0.1,
         "of the squared force error",

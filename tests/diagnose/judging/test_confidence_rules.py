@@ -190,10 +190,14 @@ def test_what_comes_and_goes_by_little_is_a_hint() -> None:
 
 def test_what_makes_an_axis_worse_is_a_hint_and_the_axis_is_named() -> None:
     for removed, improvement, sure in (
-        ({"surge": 0.6, "yaw": -0.2}, {"surge": 0.6, "yaw": -0.2}, True),
-        ({"surge": 0.6, "yaw": -0.25}, {"surge": 0.6, "yaw": -0.1}, False),
+        ({"surge": 0.1, "yaw": -0.2}, {"surge": 0.1, "yaw": -0.2}, True),
+        ({"surge": 0.3, "yaw": -0.25}, {"surge": 0.3, "yaw": -0.1}, False),
         # Over the whole log, too, as its own figures say it.
-        ({"surge": 0.6, "yaw": 0.1}, {"surge": 0.6, "yaw": -0.25}, False),
+        ({"surge": 0.3, "yaw": 0.1}, {"surge": 0.3, "yaw": -0.25}, False),
+        # A quarter of one axis's error is two halvings, twice as much as one doubling of another's.
+        ({"surge": 0.74, "yaw": -1.0}, {"surge": 0.74, "yaw": -1.0}, False),
+        ({"surge": 0.76, "yaw": -1.0}, {"surge": 0.76, "yaw": -1.0}, True),
+        ({"surge": 1.0, "sway": 0.99, "yaw": -0.84}, {"surge": 1.0, "sway": 0.99, "yaw": -0.03}, True),
     ):
         assert stands(worse_on_an_axis, found("wind", **improvement), on("force", removed=removed)) == sure
     _, note = worse_on_an_axis(found("wind"), on("force", removed={"surge": 0.6, "yaw": -3.33}))

@@ -360,7 +360,7 @@ def test_a_condition_that_makes_an_axis_worse_or_is_not_felt_is_not_confirmed() 
     least = INFERENCE.void_share
     assert condition((0.9, 0.8, 1.1), least).confirmed
     worse = condition((0.9, 0.8, 1.3), least)
-    assert worse.doubt == "it makes the held-out squared force error of the logs in yaw 30 % larger"
+    assert worse.doubt == "it makes the held-out squared force error in yaw 30 % larger"
     assert condition((0.9, 0.8, 1.1), 0.9 * least).doubt == (
         "it moves the vessel by less than 2 % of its measured acceleration"
     )
