@@ -24,7 +24,7 @@ from ferryid.diagnose.judging.campaign_evidence import Gain, held_out_loss
 from ferryid.diagnose.judging.credibility import felt, interval_doubt, unfelt, value_doubt, worsened
 from ferryid.diagnose.judging.experiment_design import manoeuvre
 from ferryid.diagnose.judging.finding import Finding, Rival
-from ferryid.diagnose.judging.rivals import redundant_shape, same_curve
+from ferryid.diagnose.judging.rivals import alike, redundant_shape
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.effect import HELD
 from ferryid.effects.wording import weak_evidence
@@ -70,7 +70,7 @@ class PropertyTest:
     rivals
         What was tried in its place, with the evidence over it [nat], below zero.
     alike
-        Ids of other shapes of the same thrust curve that explain nearly as much: formulas of shapes are idealised.
+        Ids of what explains nearly as much by a formula that is alike; see `ferryid.diagnose.judging.rivals.alike`.
     credibility
         Why it cannot be true of the vessel, or would not be felt, as the end of a sentence; empty where neither is so.
     out_of_step
@@ -224,7 +224,7 @@ def tested(made: CampaignFit, candidate: Candidate, rivals: Sequence[TriedProper
         (sum(one > 0.0 for one in by_log), len(by_log)),
         np.asarray(1.0 - squares[1] / np.where(squares[0] > 0.0, squares[0], np.inf)),
         tuple(Rival(one.candidate.effect.id, one.candidate.instance, min(one.odds, 0.0)) for one in others),
-        tuple(one.candidate.effect.id for one in others if same_curve(one.candidate, candidate, one.share)),
+        tuple(one.candidate.effect.id for one in others if alike(one.candidate, candidate, one.share)),
         _credibility(made, candidate, estimates),
         _out_of_step(made, candidate, without) if effect.id in OUT_OF_STEP else None,
     )

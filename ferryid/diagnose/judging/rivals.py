@@ -17,6 +17,7 @@ from ferryid.diagnose.inference.estimation import (
     starting_point,
     without,
 )
+from ferryid.diagnose.inference.feedback import OUT_OF_STEP
 from ferryid.diagnose.inference.onset_estimation import (
     Linearisation,
     is_brief,
@@ -77,12 +78,12 @@ class RivalComparison:
         return max((one.gain for one in (*self.rivals, *self.companions)), default=-inf)
 
     def unresolved(self, candidate: Candidate) -> tuple[str, ...]:
-        """Return the ids of effects that cannot be told from a candidate: near in evidence, or another shape that is alike."""
+        """Return the ids of effects that cannot be told from a candidate: near in evidence, or of a formula that is alike."""
         names = [
             one.candidate.effect.id
             for one in self.rivals
             if one.gain > -JUDGING.unresolved_evidence
-            or (self.evidence > 0.0 and same_curve(one.candidate, candidate, 1.0 + one.gain / self.evidence))
+            or (self.evidence > 0.0 and alike(one.candidate, candidate, 1.0 + one.gain / self.evidence))
         ]
         return tuple(dict.fromkeys(names))
 
@@ -99,6 +100,20 @@ def same_curve(one: Candidate, other: Candidate, share: float) -> bool:
     """
     shapes = one.effect.of_thrust_curve and other.effect.of_thrust_curve
     return shapes and one.instance == other.instance and share >= JUDGING.alike_shapes
+
+
+def alike(one: Candidate, other: Candidate, share: float) -> bool:
+    """Tell whether two formulas idealise what lies between them, and one explains nearly as much as the other.
+
+    Two shapes of a thrust curve, or a delay and a first-order lag: a receiver's filter and a propeller's drive are neither.
+
+    Parameters
+    ----------
+    one, other, share
+        As of `same_curve`.
+    """
+    out_of_step = one.effect.id in OUT_OF_STEP and other.effect.id in OUT_OF_STEP
+    return same_curve(one, other, share) or (out_of_step and share >= JUDGING.alike_shapes)
 
 
 def redundant_shape(

@@ -23,7 +23,7 @@ class JudgingThresholds:
     alike_shapes: float = threshold(
         0.9,
         "of the evidence over none",
-        "what another shape of the same thrust curve must explain to be unresolved, too",
+        "what another shape of the same thrust curve, or a lag beside a delay, must explain to be unresolved, too",
         "tuned on validation runs at sea: a limit and an idealised loss by air, each taken for the other at 0.91 and 0.93; "
         "applied to single logs alike",
     )

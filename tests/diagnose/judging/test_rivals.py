@@ -54,6 +54,14 @@ def test_other_effects_and_other_actuators_have_no_curve_in_common(fitted: Fit) 
     assert not same_curve(candidate("thruster_gain"), candidate(LIMIT), 0.95)
 
 
+def test_a_delay_and_a_lag_are_two_formulas_of_one_response(fitted: Fit) -> None:
+    near, far = -0.09 * 300.0, -0.11 * 300.0
+    for one, other in (("time_delay", "thruster_lag"), ("thruster_lag", "time_delay")):
+        assert compared(fitted, {other: near}, 300.0).unresolved(candidate(one)) == (other,)
+        assert compared(fitted, {other: far}, 300.0).unresolved(candidate(one)) == ()
+    assert compared(fitted, {"time_delay": near}, 300.0).unresolved(candidate(LIMIT)) == ()
+
+
 def test_a_finding_without_evidence_has_no_shape_beside_it(fitted: Fit) -> None:
     assert compared(fitted, {AIR: -10.0}, 0.0).unresolved(candidate(LIMIT)) == ()
     assert replace(compared(fitted, {}, 300.0), rivals=()).unresolved(candidate(LIMIT)) == ()
