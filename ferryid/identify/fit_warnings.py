@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from ferryid.counts import counted, verb
+from ferryid.effects.wording import listed
 from ferryid.identify.outcome import Excitation
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.split import Split
@@ -16,7 +17,7 @@ from ferryid.models import ModelScores
 from ferryid.models.prediction import FreeRun
 from ferryid.signals.prepare import Prepared
 from ferryid.signals.track import Motion
-from ferryid.types import AXES
+from ferryid.types import AXES, Floats
 
 
 def fit_warnings(
@@ -95,18 +96,40 @@ def _axis_warnings(scores: ModelScores) -> list[str]:
     return warnings
 
 
+def rest_warnings(force: Callable[[Floats], Floats], visited: Floats) -> tuple[str, ...]:
+    """Say where a model is driven by a constant force that counts beside its damping: without thrust it does not stay at rest.
+
+    Parameters
+    ----------
+    force
+        Force that a constant velocity takes in still water and air, of velocities (n, 3) to (n, 3).
+    visited
+        Velocities of the motions, shape (n, 3).
+    """
+    nu = visited[np.isfinite(visited).all(axis=1)]
+    if not len(nu):
+        return ()
+    constant = force(np.zeros((1, 3)))[0]
+    usual = np.mean(np.abs(force(nu) - constant), axis=0)
+    drives = [
+        f"{-constant[k]:.3g} {'N·m' if axis == 'yaw' else 'N'} in {axis} "
+        f"({100.0 * abs(constant[k]) / usual[k]:.0f} % of the mean damping)"
+        for k, axis in enumerate(AXES)
+        if abs(constant[k]) > IDENTIFY.constant_share * usual[k] > 0.0
+    ]
+    if not drives:
+        return ()
+    return (
+        f"Without thrust the model moves by itself, by a constant force of {listed(drives)}: the logs have it at all speeds, "
+        "as by a wind, a current, or thrust that differs from its curve. Simulate only what the logs have.",
+    )
+
+
 def free_run_warnings(base: FreeRun, new: FreeRun) -> tuple[str, ...]:
     """Say where the new model runs free badly, or worse than the base model, which its force error does not show."""
     if base.starts and not new.starts:
         return (f"The new model cannot be run free: {new.note}.",)
     warnings = []
-    turned = np.flatnonzero((new.heading_rad > IDENTIFY.useless_rad) & (new.horizons_s <= IDENTIFY.useless_s))
-    if turned.size:
-        k = int(turned[0])
-        warnings.append(
-            f"Run free for {new.horizons_s[k]:g} s the model's heading is off by {np.degrees(new.heading_rad[k]):.0f}° (rms): "
-            "it does not describe how this vessel turns. Was anything else moving it, or an actuator not engaged?"
-        )
     for name, label, unit, factor in (
         ("position_m", "position", "m", 1.0),
         ("heading_rad", "heading", "deg", float(np.degrees(1.0))),

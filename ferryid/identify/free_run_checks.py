@@ -32,11 +32,11 @@ def free_run_checks(old: FreeRun, new: FreeRun, reference: str = "base model") -
         What the old model is called in the reasons.
     """
     if old.single is None:
-        return (_not_compared("free_run", f"Free runs are not compared: {old.note}."),)
+        return (_not_compared("free_run", f"Free runs are not compared: {old.note}."), *_turns(new))
     if new.single is None:
         reason = f"The new model cannot be run free, the {reference} can: {new.note}."
         return (Check("free_run", False, 0.0, float(old.starts), "runs", reason),)
-    checks = [_divergence(old.single, new.single, reference)]
+    checks = [_divergence(old.single, new.single, reference), *_turns(new)]
     missing = []
     for horizon_s in JUDGED_S:
         columns = np.flatnonzero(np.isclose(old.horizons_s, horizon_s))
@@ -66,6 +66,25 @@ def _divergence(old: SingleRuns, new: SingleRuns, reference: str) -> Check:
         f"{reference} had not" + (", and none may: do not simulate with it." if count else ".")
     )
     return Check("divergence", count == 0, float(count), 0.0, "runs", reason)
+
+
+def _turns(new: FreeRun) -> tuple[Check, ...]:
+    """Return whether the heading stays near for as long as a short manoeuvre takes, however badly the other model does.
+
+    Empty where no held-out stretch is long enough for a run.
+    """
+    short = np.flatnonzero((new.horizons_s <= IDENTIFY.useless_s) & np.isfinite(new.heading_rad))
+    if not short.size:
+        return ()
+    worst = short[np.argmax(new.heading_rad[short])]
+    off, most = (float(np.degrees(one)) for one in (new.heading_rad[worst], IDENTIFY.useless_rad))
+    seconds = new.horizons_s[worst]
+    useless = ": it does not describe how this vessel turns. Was anything else moving it, or an actuator not engaged?"
+    reason = (
+        f"Run free for {seconds:g} s the new model's heading is off by {off:.3g}° (rms), and {most:.0f}° is allowed"
+        f"{'.' if off <= most else useless}"
+    )
+    return (Check("free_run_heading", off <= most, off, most, "deg", reason),)
 
 
 def _at_horizon(

@@ -140,12 +140,16 @@ def _feeding_share(force: Callable[[Floats], Floats], nu: Floats, whole: float) 
     return float(np.mean(power < -IDENTIFY.damping_power * usual))
 
 
+def law_of(data: FitData, found: Coefficients) -> Estimator:
+    """Return the force law of a fit's coefficients, base model included."""
+    return Estimator(data.profile, data.settings.scale, data.functions, found.theta, found.intercept)
+
+
 def physical_checks(data: FitData, found: Coefficients) -> tuple[Check, ...]:
     """Return whether the inertia and the damping of a fit's coefficients, base model included, can be a hull's."""
     profile, scale, functions = data.profile, data.settings.scale, data.functions
-    law = Estimator(profile, scale, functions, found.theta, found.intercept)
     every = (
         *inertia_checks(profile, effective_mass(profile, scale, functions.terms, found.theta)),
-        *damping_checks(law.at_constant_velocity, data.visited),
+        *damping_checks(law_of(data, found).at_constant_velocity, data.visited),
     )
     return tuple(check for check in every if not (data.settings.reduced and check.name.endswith("_sway")))

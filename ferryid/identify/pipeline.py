@@ -19,7 +19,7 @@ from ferryid.identify.estimation import estimate_correction
 from ferryid.identify.estimators import choose_estimator
 from ferryid.identify.excitation import still_axes
 from ferryid.identify.fit_data import Coefficients, Estimate, FitData
-from ferryid.identify.fit_warnings import free_run_warnings
+from ferryid.identify.fit_warnings import free_run_warnings, rest_warnings
 from ferryid.identify.force_signs import refuse_reversed_forces
 from ferryid.identify.free_run_checks import free_run_checks
 from ferryid.identify.held_out_checks import held_out_checks, skill_checks
@@ -29,7 +29,7 @@ from ferryid.identify.model_selection import Selection, select_model, windows_to
 from ferryid.identify.motion_data import LogData, compute_residuals, numbered_names
 from ferryid.identify.outcome import ComponentCurve, EstimatorScore, Excitation, FitOutcome
 from ferryid.identify.own_conditions import with_own_conditions
-from ferryid.identify.physical_checks import physical_checks
+from ferryid.identify.physical_checks import law_of, physical_checks
 from ferryid.identify.rows import basis_for
 from ferryid.identify.settings import TEST_WINDOW_S, FitSettings, check_components
 from ferryid.identify.sign_changes import sign_changes
@@ -240,6 +240,7 @@ def accept_estimate(
         *final.held,
         *free_run_warnings(free_base, free_new),
         *sign_changes(model),
+        *rest_warnings(law_of(told, stored).at_constant_velocity, told.visited),
         *told.condition_notes,
         *final.notes,
         *data.warnings(excitation, scores),

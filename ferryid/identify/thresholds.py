@@ -121,10 +121,16 @@ class IdentifyThresholds:
     useless_rad: float = threshold(
         0.5,
         "rad",
-        "error of a free run's heading within `useless_s` that gives a warning",
+        "error of a free run's heading within `useless_s` beyond which a model is not accepted",
         "convention: 30°, another course",
     )
     useless_s: float = threshold(10.0, "s", "see `useless_rad`", "convention: the shortest manoeuvre")
+    constant_share: float = threshold(
+        0.5,
+        "of the mean damping",
+        "constant force on an axis from which a warning says that the model does not stay at rest",
+        "convention: half of what the vessel's motion meets",
+    )
     free_run_worsening: float = threshold(
         0.05,
         "of the base model's error",

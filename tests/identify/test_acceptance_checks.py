@@ -134,6 +134,23 @@ def test_free_runs_are_worse_only_beyond_their_interval() -> None:
     assert not failed(free_run_checks(runs(old), runs(by_chance)))
 
 
+def test_a_heading_that_is_lost_within_seconds_rejects_however_bad_the_base_model_is() -> None:
+    old = runs(np.ones((12, 3)))
+
+    def off(*degrees: float) -> FreeRun:
+        return replace(old, horizons_s=np.array([5.0, 10.0, 30.0]), heading_rad=np.radians(degrees))
+
+    assert "free_run_heading" not in failed(free_run_checks(off(90.0, 90.0, 90.0), off(10.0, 28.0, 120.0)))
+    rejected = [one for one in free_run_checks(off(170.0, 90.0, 90.0), off(145.0, 20.0, 20.0)) if one.passed is False]
+    assert [one.name for one in rejected] == ["free_run_heading"]
+    assert rejected[0].reason.startswith(
+        "Run free for 5 s the new model's heading is off by 145° (rms), and 29° is allowed: it does not describe"
+    )
+    assert "free_run_heading" in failed(free_run_checks(FreeRun.not_run("no inertia"), off(10.0, 40.0, 40.0)))
+    # No held-out stretch was long enough.
+    assert not failed(free_run_checks(old, off(np.nan, np.nan, np.nan)))
+
+
 def test_a_free_run_that_diverges_rejects_where_the_base_model_does_not() -> None:
     old = np.ones((12, 3))
     lost = old.copy()

@@ -117,8 +117,8 @@ class PropertyTest:
             return weak_evidence(self.evidence, INFERENCE.prior_odds)
         if self.gain.low <= 0.0:
             return "held-out stretches of the logs are not surely predicted better with it"
-        if held < JUDGING.campaign_share * logs:
-            return f"only {held} of {counted(logs, 'log')} are predicted better with it on held-out stretches"
+        if held <= JUDGING.campaign_share * logs:
+            return f"only {held} of {counted(logs, 'log')} {verb(held, 'is')} predicted better with it on held-out stretches"
         if self.credibility:
             return self.credibility
         if harm := worsened(dict(zip(AXES, self.improvement.tolist(), strict=True))):

@@ -386,6 +386,10 @@ def test_a_property_and_a_difference_that_are_not_credible_are_not_confirmed() -
     estimates = found("thruster_gain").parameters
     test = PropertyTest(weak, estimates, 50.0, Gain(40.0, 10.0, 70.0), (3, 3), np.array([0.5, 0.5, 0.5]), ())
     assert test.confirmed
+    # A weak propeller in one of two logs is no property of both.
+    assert replace(test, holding=(1, 2)).doubt == "only 1 of 2 logs is predicted better with it on held-out stretches"
+    assert not replace(test, holding=(2, 4)).confirmed
+    assert replace(test, holding=(2, 3)).confirmed
     assert replace(test, credibility="nobody has such a thruster").doubt == "nobody has such a thruster"
     bound = {"factor": replace(estimates["value"], value=2.99, low=2.9, high=3.0)}
     gain = Gain(40.0, 10.0, 70.0)
