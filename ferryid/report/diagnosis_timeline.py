@@ -88,9 +88,10 @@ def _motion(diagnosis: Diagnosis) -> list[Strip]:
     surge, sway, yaw = evidence["nu"].T
     strips = [
         Strip(
-            "velocity over ground [m/s]", (Trace("surge u", surge, "c0"), Trace("sway v", sway, "c1", dash=(6.0, 3.0)))
+            "velocity over ground, window means [m/s]",
+            (Trace("surge u", surge, "c0"), Trace("sway v", sway, "c1", dash=(6.0, 3.0))),
         ),
-        Strip("yaw rate [deg/s]", (Trace("yaw rate r", np.degrees(yaw), "c0"),)),
+        Strip("yaw rate, window means [deg/s]", (Trace("yaw rate r", np.degrees(yaw), "c0"),)),
     ]
     if "before" not in evidence and "thrust" in evidence:
         forces = zip(AXES, SYMBOLS, UNITS, evidence["thrust"].T, strict=True)
