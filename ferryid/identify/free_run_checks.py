@@ -69,19 +69,18 @@ def _divergence(old: SingleRuns, new: SingleRuns, reference: str) -> Check:
 
 
 def _turns(new: FreeRun) -> tuple[Check, ...]:
-    """Return whether the heading stays near for as long as a short manoeuvre takes, however badly the other model does.
+    """Return whether the heading stays near in the shortest runs, of a short manoeuvre at most, however bad the other model is.
 
     Empty where no held-out stretch is long enough for a run.
     """
     short = np.flatnonzero((new.horizons_s <= IDENTIFY.useless_s) & np.isfinite(new.heading_rad))
     if not short.size:
         return ()
-    worst = short[np.argmax(new.heading_rad[short])]
-    off, most = (float(np.degrees(one)) for one in (new.heading_rad[worst], IDENTIFY.useless_rad))
-    seconds = new.horizons_s[worst]
+    first = short[0]
+    off, most = (float(np.degrees(one)) for one in (new.heading_rad[first], IDENTIFY.useless_rad))
     useless = ": it does not describe how this vessel turns. Was anything else moving it, or an actuator not engaged?"
     reason = (
-        f"Run free for {seconds:g} s the new model's heading is off by {off:.3g}° (rms), and {most:.0f}° is allowed"
+        f"Run free for {new.horizons_s[first]:g} s the new model's heading is off by {off:.3g}° (rms), and {most:.0f}° is allowed"
         f"{'.' if off <= most else useless}"
     )
     return (Check("free_run_heading", off <= most, off, most, "deg", reason),)
