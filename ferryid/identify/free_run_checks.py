@@ -69,7 +69,7 @@ def _divergence(old: SingleRuns, new: SingleRuns, reference: str) -> Check:
 
 
 def _turns(new: FreeRun) -> tuple[Check, ...]:
-    """Return whether the heading stays near in the shortest runs, of a short manoeuvre at most, however bad the other model is.
+    """Return whether the heading stays near in the shortest runs, however bad those of the other model are.
 
     Empty where no held-out stretch is long enough for a run.
     """
