@@ -80,8 +80,8 @@ def _turns(new: FreeRun) -> tuple[Check, ...]:
     off, most = (float(np.degrees(one)) for one in (new.heading_rad[first], IDENTIFY.useless_rad))
     useless = ": it does not describe how this vessel turns. Was anything else moving it, or an actuator not engaged?"
     reason = (
-        f"Run free for {new.horizons_s[first]:g} s the new model's heading is off by {off:.3g}° (rms), and {most:.0f}° is allowed"
-        f"{'.' if off <= most else useless}"
+        f"Run free for {new.horizons_s[first]:g} s the new model's heading is off by {off:.3g}° (rms), and {most:.0f}° is "
+        f"allowed{'.' if off <= most else useless}"
     )
     return (Check("free_run_heading", off <= most, off, most, "deg", reason),)
 
