@@ -26,6 +26,7 @@ from ferryid.validation.checkpoint import discard, run_stage
 from ferryid.validation.commitment import SEAL_FILE, commitment, publish_answers, publish_commitment, read_seal
 from ferryid.validation.interfaces import Pipeline, Trial
 from ferryid.validation.pace import Pace
+from ferryid.validation.recorded.summary import size_lines
 from ferryid.validation.records import CaseResult, Diagnosis, Failure
 from ferryid.validation.run_folder import RESULT_FILE, RunFolder, open_run_folder, remove_temporary
 from ferryid.validation.source_hash import source_hash
@@ -246,6 +247,7 @@ def render_summary(result: Mapping[str, Any]) -> str:
     lines = [
         f"{counts['cases']} cases of seed {result['seed']}: {counts['diagnosed']} diagnosed, {counts['refused']} refused, "
         f"{counts['crashed']} crashed",
+        *size_lines(result.get("scores", {}).get("responses", ())),
         *(f"  {_outcome(one):<10}  {one['what']}" for one in result["targets"]),
         f"commitment: {result['commitment']}",
         f"page:       {result['folder']}/{Path(result['folder']).name}.md",

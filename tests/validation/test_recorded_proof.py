@@ -84,7 +84,12 @@ def test_from_the_recording_to_the_page(tmp_path: Path, monkeypatch: pytest.Monk
     assert "| lever_arm | zigzag | m |" in text
     assert "(proof-real/detection.svg)" in text
     assert (folder / "proof-real" / "detection.svg").exists()
-    assert f"{folder}/proof-real.md" in render_summary(result)
+    summary = render_summary(result)
+    assert f"{folder}/proof-real.md" in summary
+    sizes, named = sorted(response["sizes"]), sum(response["named"])
+    least, most, first = sizes[0], sizes[-1], sizes[-named]
+    line = f"lever_arm: named from {first:.3g} m on; {named} of 5 sizes from {least:.3g} to {most:.3g} m named"
+    assert line in summary
     assert len(verified_answers(folder)["cases"]) == 6
     # Killed after four diagnoses, it goes on with the other two.
     lines = folder / "lines" / "diagnosed.jsonl"
