@@ -75,7 +75,7 @@ def least_sizes(
         moved = windows.gap(candidate.act(force_model, one.usual)) - before
         share = float((np.sqrt(np.mean(moved**2, axis=0)) / usual).max())
         multiple = max(one.multiple, INFERENCE.void_share / max(share, 1e-12))
-        size = _size(candidate, one.usual)
+        size = size_of(candidate, one.usual)
         if size > 0.0:
             multiple = max(multiple, candidate.effect.negligible / size)
         made.append(_least(candidate, multiple * size if multiple <= _largest(candidate, one.usual) else None))
@@ -112,7 +112,7 @@ def _mine(candidate: Candidate) -> list[int]:
     return [k for k, one in enumerate(candidate.parameters) if one.unit == unit and one.size > HELD]
 
 
-def _size(candidate: Candidate, values: Floats) -> float:
+def size_of(candidate: Candidate, values: Floats) -> float:
     """Return how far parameters are from neutral: the length of a vector, else the largest."""
     away = [float(values[k]) - candidate.parameters[k].neutral for k in _mine(candidate)]
     names = {candidate.parameters[k].name for k in _mine(candidate)}

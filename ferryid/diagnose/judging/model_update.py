@@ -12,14 +12,17 @@ from typing import Any
 import numpy as np
 
 from ferryid import __version__
-from ferryid.counts import counted
+from ferryid.counts import counted, verb
+from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.judging.credibility import impossible_masses
 from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.diagnose.judging.learning import Learner
+from ferryid.diagnose.judging.least_sizes import size_of
 from ferryid.diagnose.judging.posterior import HullPosterior, Posterior
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS, UNITS
+from ferryid.effects.wording import listed
 from ferryid.files import alone
 from ferryid.identify import Acceptance, accept
 from ferryid.models import Conditions, ForceScores, Model, ModelScores, Quantity, StoredEffect, blank_model
@@ -108,7 +111,7 @@ def update_model(
     logs = [one.posterior for one in diagnoses if one.posterior is not None]
     if not logs:
         return None, ()
-    vessel, notes = _properties(logs, profile)
+    vessel, notes = _properties(logs, profile, diagnoses)
     judged = [one for one in diagnoses if one.posterior is not None and one.before.get("mse")]
     # Logs that are short have no figures of their own.
     verdict, scores = _scores(judged) if judged else (None, None)
@@ -186,7 +189,9 @@ def _quantities(hull: Floats, covariance: Floats) -> dict[str, Quantity]:
     }
 
 
-def _properties(logs: Sequence[Posterior], profile: Profile) -> tuple[tuple[StoredEffect, ...], tuple[str, ...]]:
+def _properties(
+    logs: Sequence[Posterior], profile: Profile, diagnoses: Sequence[Diagnosis]
+) -> tuple[tuple[StoredEffect, ...], tuple[str, ...]]:
     """Return the vessel's properties that the logs agree on, and what is to be told of them."""
     by_key: dict[tuple[str, str | None], list[StoredEffect]] = {}
     for log in logs:
@@ -203,6 +208,12 @@ def _properties(logs: Sequence[Posterior], profile: Profile) -> tuple[tuple[Stor
                 "Something changed between them; diagnose each by itself."
             )
             continue
+        if absent := _absent(found, diagnoses, profile):
+            notes.append(
+                f"{title} does not enter the model: {listed([one.sources[0].log for one in found])} "
+                f"{verb(len(found), 'shows')} it, and {listed(absent)} {verb(len(absent), 'does')} not, where half of it would have been seen. Something changed between them; diagnose each by itself."
+            )
+            continue
         if len(found) < len(logs):
             where = ", ".join(one.sources[0].log for one in found)
             notes.append(
@@ -210,6 +221,28 @@ def _properties(logs: Sequence[Posterior], profile: Profile) -> tuple[tuple[Stor
             )
         kept.append(_together(found))
     return tuple(kept), tuple(notes)
+
+
+def _absent(found: Sequence[StoredEffect], diagnoses: Sequence[Diagnosis], profile: Profile) -> list[str]:
+    """Return the logs that do not show a property that acts all along in others, and would have shown half of it."""
+    sources = [source for one in found for source in one.sources]
+    if any(one.onset_s is not None for one in sources):
+        # What set in within one log may last in the next, and was not in the one before.
+        return []
+    effect, instance = found[0].key
+    candidate = Candidate.of(effects()[effect], instance, profile)
+    size = min(size_of(candidate, np.array(list(one.values.values()))) for one in found)
+    return [
+        one.log
+        for one in diagnoses
+        if one.log not in {source.log for source in sources}
+        and any(
+            (least.effect, least.instance) == (effect, instance)
+            and least.value is not None
+            and size >= JUDGING.absent_multiple * least.value
+            for least in one.least_sizes
+        )
+    ]
 
 
 def _contradictions(found: Sequence[StoredEffect], profile: Profile) -> list[str]:

@@ -330,6 +330,12 @@ class JudgingThresholds:
         "variance by which logs of a vessel differ about its hull over that of their noise, where one log alone brings it",
         "tuned on real campaigns of one vessel, in which it is 1.5 to 2.9, and 4.6 where some logs have unrecorded forces",
     )
+    absent_multiple: float = threshold(
+        2.0,
+        "times the least size that a log shows",
+        "size from which a lasting property that another log does not show contradicts it",
+        "convention: the least size has an even chance to be named, twice that hardly fails to be",
+    )
     contradiction_share: float = threshold(
         0.25,
         "of the usual size",

@@ -20,6 +20,7 @@ from ferryid.diagnose.inference.stochastic_disturbance import DisturbanceState
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.diagnose.judging.finding import Finding
+from ferryid.diagnose.judging.least_sizes import LeastSize
 from ferryid.diagnose.judging.model_update import store_updated_model, update_model
 from ferryid.diagnose.judging.posterior import Posterior, posterior_of
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
@@ -292,6 +293,36 @@ def test_logs_that_agree_are_weighed_and_those_that_do_not_are_told(folder: Path
     assert made is not None
     wide = made.vessel_effects[0].parameters["surge"]
     assert wide.high - wide.low > 0.1 / np.sqrt(2.0) * 1.2
+
+
+def test_what_another_log_would_have_shown_and_does_not_enters_no_model(folder: Path) -> None:
+    weak = sailed(folder, "weak", BRISK, 12, BROKEN)
+    found, _ = taught(weak, "thruster_gain")
+    (first,) = told(found)
+    instance = found.vessel[0].instance
+    away = 1.0 - found.vessel[0].values["factor"]
+
+    def beside(least: float | None, thruster: str | None = instance) -> tuple[Model, tuple[str, ...]]:
+        unseen = LeastSize("thruster_gain", thruster, least, "-", "")
+        sound = Diagnosis("sound", "milliampere", "matched", (), {}, {}, least_sizes=(unseen,))
+        made, notes = update_model([first, sound], FERRY, None, "ferry")
+        assert made is not None
+        return made, notes
+
+    made, notes = beside(0.49 * away)
+    assert (made.vessel_effects, made.accepted) == ((), False)
+    assert (
+        "does not enter the model: weak shows it, and sound does not, where half of it would have been seen" in notes[0]
+    )
+    for made, notes in (beside(0.51 * away), beside(None), beside(0.1 * away, "another")):
+        assert [one.effect for one in made.vessel_effects] == ["thruster_gain"]
+        assert notes == ()
+    # What set in may have lasted since.
+    (stored,) = found.vessel
+    began = replace(stored, sources=tuple(replace(one, onset_s=100.0) for one in stored.sources))
+    (first,) = told(replace(found, vessel=(began,)))
+    made, _ = beside(0.1 * away)
+    assert len(made.vessel_effects) == 1
 
 
 def test_one_estimate_from_all_logs_counts_once(folder: Path, fouled: str) -> None:
