@@ -268,5 +268,5 @@ def _too_short(motion: Motion, used: Flags, needed_s: float, what: str) -> TooSh
     seconds = np.count_nonzero(used) / motion.rate_hz
     return TooShort(
         f"{motion.log}: too short for {what}, found {seconds:.1f} s of usable rows and {needed_s:.1f} s are needed. "
-        "Fix: use a longer log, a shorter smoothing window, or several logs with --split logs"
+        "Fix: give a longer log, or several logs of the vessel in one command, of which short ones are held out whole"
     )

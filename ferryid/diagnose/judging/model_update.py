@@ -211,7 +211,8 @@ def _properties(
         if absent := _absent(found, diagnoses, profile):
             notes.append(
                 f"{title} does not enter the model: {listed([one.sources[0].log for one in found])} "
-                f"{verb(len(found), 'shows')} it, and {listed(absent)} {verb(len(absent), 'does')} not, where half of it would have been seen. Something changed between them; diagnose each by itself."
+                f"{verb(len(found), 'shows')} it, and {listed(absent)} {verb(len(absent), 'does')} not, "
+                "where half of it would have been seen. Something changed between them; diagnose each by itself."
             )
             continue
         if len(found) < len(logs):
