@@ -7,6 +7,7 @@ from math import isfinite, pi, tau
 from typing import Any
 
 from ferryid.diagnose import Diagnosis, Estimate, error_ratio
+from ferryid.effects.wording import listed
 from ferryid.types import AXES
 
 FREE_RUN = (
@@ -15,6 +16,8 @@ FREE_RUN = (
     ("speed_mps", "speed", "m/s", 1.0),
     ("yaw_rate_radps", "yaw rate", "deg/s", 57.29577951308232),
 )
+WORSE_RUN = 1.1
+"""Ratio of free-run errors from which a caution is given: less may be chance."""
 
 
 def fitted(diagnosis: Diagnosis) -> bool:
@@ -79,10 +82,27 @@ def free_run_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
         rows.append(
             {
                 "name": f"{name} after {horizons[k]:.3g} s [{unit}]",
+                "quantity": name,
+                "ratio": ratio.value,
                 "cells": [*(_turned(key, each / factor, _cell(each)) for each in (one, other)), _ratio(ratio)],
             }
         )
     return rows
+
+
+def free_run_caution(diagnosis: Diagnosis) -> str:
+    """Return in what free runs err more with the findings than without, as a sentence; empty where in nothing."""
+    if not fitted(diagnosis):
+        return ""
+    worse = [
+        f"{row['quantity']} ({row['ratio']:.2f} times)" for row in free_run_rows(diagnosis) if row["ratio"] > WORSE_RUN
+    ]
+    if not worse:
+        return ""
+    return (
+        f"Free runs err more with the findings, in {listed(worse)}, whatever the force errors say: do not simulate with the "
+        "model unchecked."
+    )
 
 
 def _estimated(given: Mapping[str, Any]) -> Estimate:

@@ -154,6 +154,7 @@ def _one_as_text(one: Diagnosis) -> str:
         lines += ["", f"{'free run on held-out data':<44}" + "".join(f"{name:>22}" for name in names)]
         for row in runs:
             lines.append(f"{row['name']:<44}" + "".join(f"{cell:>22}" for cell in row["cells"][: len(names)]))
+        lines += [caution] if (caution := diagnosis_errors.free_run_caution(one)) else []
     hidden = [f"withheld {one_hidden.signal}: {one_hidden.says}" for one_hidden in one.withheld]
     remarks = [*hidden, *(f"note: {note}" for note in diagnosis_words.notes_of(one, foremost))]
     remarks += [f"note: {text}"] if (text := least_sizes.line(one)) else []
@@ -220,6 +221,7 @@ def _log(
         "names": campaign.names_of(diagnosis, common),
         "force_rows": force_rows,
         "free_run_rows": free_run_rows,
+        "free_run_caution": diagnosis_errors.free_run_caution(diagnosis),
         "free_run_figures": _free_run_figures(diagnosis, prefix, drawings) if drawn else [],
         "intervals": any(" to " in cell for row in (*force_rows, *free_run_rows) for cell in row["cells"]),
         "free_run_note": diagnosis.before.get("free_run", {}).get("note", ""),

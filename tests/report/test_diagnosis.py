@@ -33,7 +33,7 @@ from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json
-from ferryid.report.diagnosis_errors import force_rows, free_run_rows, ratio_of
+from ferryid.report.diagnosis_errors import force_rows, free_run_caution, free_run_rows, ratio_of
 from ferryid.report.diagnosis_figures import _profile, binned, in_regime
 from ferryid.report.diagnosis_page import as_text, render
 from ferryid.report.diagnosis_report import as_json, patient, report
@@ -280,6 +280,25 @@ def test_a_free_run_that_turned_too_often_is_told_in_turns() -> None:
     position, heading = free_run_rows(replace(diagnosis("explained"), before=before, after=after))
     assert heading["cells"][:2] == ["957 (2.7 turns)", "5.73"]
     assert position["cells"][:2] == ["40", "40"]
+
+
+def test_free_runs_that_err_more_with_the_findings_are_cautioned_of() -> None:
+    made = diagnosis("explained")
+
+    def after_runs(position: float, heading: float) -> Diagnosis:
+        runs = [
+            {"horizons_s": [60.0], "position_m": [one], "heading_rad": [other]}
+            for one, other in ((40.0, 0.5), (position, heading))
+        ]
+        before, after = ({**part, "free_run": run} for part, run in zip((made.before, made.after), runs, strict=True))
+        return replace(made, before=before, after=after)
+
+    assert free_run_caution(after_runs(20.0, 0.54)) == ""
+    said = free_run_caution(after_runs(60.0, 0.6))
+    assert said.startswith("Free runs err more with the findings, in position (1.50 times) and heading (1.20 times),")
+    assert said in " ".join(as_text([after_runs(60.0, 0.6)]).split())
+    # Without findings there is nothing to compare.
+    assert free_run_caution(replace(after_runs(60.0, 0.6), findings=())) == ""
 
 
 def test_the_verdict_says_why_all_findings_remove_less_than_one_of_them_alone() -> None:
