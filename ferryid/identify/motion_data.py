@@ -10,6 +10,7 @@ from typing import Any, Self
 import numpy as np
 
 from ferryid.cached import cached_property
+from ferryid.identify.averaged_out import averaged_out
 from ferryid.identify.contradictions import faint_force
 from ferryid.identify.excitation import assess_excitation, still_warnings
 from ferryid.identify.fit_data import Coefficients, Estimate, FitData
@@ -251,6 +252,7 @@ class LogData(MotionData):
         return (
             *filter(None, [faint]),
             *still_warnings(self.profile, self.motions),
+            *averaged_out(self.profile, self.motions),
             *fit_warnings(self.settings, self.split, excitation, self.prepared, self.motions, scores),
         )
 

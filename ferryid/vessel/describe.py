@@ -15,7 +15,15 @@ def describe(profile: Profile) -> str:
 
 def _heading(profile: Profile) -> list[str]:
     setting = [f"Setting: {profile.setting}"] if profile.setting else []
-    return [f"{profile.name}: {profile.title}", f"Source: {profile.source}", *setting, f"File: {profile.path}", ""]
+    window = [f"Forces are averaged over: {profile.window_s:g} s"] if math.isfinite(profile.window_s) else []
+    return [
+        f"{profile.name}: {profile.title}",
+        f"Source: {profile.source}",
+        *setting,
+        *window,
+        f"File: {profile.path}",
+        "",
+    ]
 
 
 def _hull(profile: Profile) -> list[str]:

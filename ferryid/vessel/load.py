@@ -23,6 +23,8 @@ from ferryid.vessel.profile import SETTINGS, Profile
 from ferryid.vessel.toml_lines import key_lines, too_deep
 
 SCHEMA = "ferryid.vessel/1"
+SHORTEST_WINDOW_S, LONGEST_WINDOW_S = 0.2, 120.0
+"""What windows may be set to [s]: a few rows of a fast log, and the windows of a ship of a kilometre."""
 
 
 def bundled() -> tuple[str, ...]:
@@ -157,6 +159,7 @@ def _parse(text: str, where: str) -> tuple[Profile | None, list[Fault]]:
     title = top.text("title", default=name)
     source = top.text("source", required=True)
     setting = top.text("setting", options=SETTINGS)
+    window_s = top.number("window_s", at_least=SHORTEST_WINDOW_S, at_most=LONGEST_WINDOW_S)
     hull = parse_hull(top.table("hull", required=True, needs="without it there is no base model"))
     wind = parse_wind(top.table("wind"))
     actuators = parse_actuators(top, hull)
@@ -181,6 +184,7 @@ def _parse(text: str, where: str) -> tuple[Profile | None, list[Fault]]:
         text=text,
         sha256=hashlib.sha256(text.encode()).hexdigest(),
         setting=setting,
+        window_s=window_s,
     )
     return profile, faults
 

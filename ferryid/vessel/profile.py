@@ -156,7 +156,8 @@ class Profile:
     """A vessel and where its signals live in a log; read from one TOML file by `ferryid.vessel.load_profile`.
 
     `text` is the TOML source, which a model file embeds; `sha256` is its hash. `setting` is one of `SETTINGS`: where the logs
-    were recorded; empty where that is not known.
+    were recorded; empty where that is not known. `window_s` is the length of the windows in which forces are averaged [s]; NaN
+    where it follows from the vessel's length.
     """
 
     name: str
@@ -171,6 +172,7 @@ class Profile:
     text: str
     sha256: str
     setting: str = ""
+    window_s: float = nan
 
     @property
     def given_as(self) -> str:

@@ -99,6 +99,11 @@ CASES = {
     "mass of no vessel": ("mass_kg = 1000.0", "mass_kg = 1e308@", "1e+308 is not plausible for any vessel"),
     "mass of nothing": ("mass_kg = 1000.0", "mass_kg = 1e-300@", "must be at least 1e-12"),
     "damping of no vessel": ('"X_u" = -20.0', '"X_u" = -1e308@', "must be at most 1e+15 in size"),
+    "windows of no time": (
+        'name = "boat"',
+        'name = "boat"\nwindow_s = 0@',
+        "must be at least 0.2 and at most 120, found 0",
+    ),
     "mass as text": ("mass_kg = 1000.0", 'mass_kg = "1000"@', "must be a number, found a string"),
     "mass not finite": ("mass_kg = 1000.0", "mass_kg = inf@", "must be above 0, found inf"),
     "no inertia": (

@@ -12,6 +12,7 @@ from ferryid.diagnose.data.thresholds import DATA
 from ferryid.effects.force_model import Measurements
 from ferryid.effects.measurements import actuator_forces, interpolate_gaps, rudder_states
 from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.identify import averaged_out
 from ferryid.models import validity_ranges
 from ferryid.signals.align import align
 from ferryid.signals.artificial import artificial
@@ -104,6 +105,8 @@ class Survey:
         False where the log is too short, or moves too little, to show any contradiction.
     jumping
         ``"position"`` or ``"heading"``, where it jumps too often to know which samples are wrong; else empty.
+    averaged_out
+        That the windows are too long for the log's manoeuvres, as a sentence; empty where they are not.
     """
 
     recording: Recording
@@ -117,6 +120,7 @@ class Survey:
     contradictions: tuple[str, ...] = ()
     comparable: bool = True
     jumping: tuple[str, ...] = ()
+    averaged_out: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -222,6 +226,7 @@ def read_measurements(
         tuple(doubt.says for doubt in track.doubts if doubt.certain),
         comparable(track),
         tuple(sorted({fault.signal for fault in faults.poses if not fault.left_out})),
+        averaged_out(profile, [motion]),
     )
     return measurements, survey
 

@@ -165,8 +165,9 @@ class Windows:
 
 
 STEPS_A_WINDOW = 20
-FORCES_HZ = 5.0
-"""Rate at which forces are averaged over windows; they change slowly against it, and hypotheses cost a quarter."""
+FORCES_HZ, LEAST_ROWS = 5.0, 16.0
+"""Rate at which forces are averaged over windows, as they change slowly against it and hypotheses cost a quarter; and fewest
+rows of forces in a window, for which the rate is higher in short ones."""
 
 
 def windows(measurements: Measurements, length_s: float, stride_s: float) -> Windows:
@@ -175,7 +176,7 @@ def windows(measurements: Measurements, length_s: float, stride_s: float) -> Win
     The weight is ``sin^4``: it and its first three derivatives vanish at the ends. Measured motion is averaged at the full
     rate, and the measurements for the forces are thinned to `FORCES_HZ`.
     """
-    every = max(1, round(1.0 / (FORCES_HZ * measurements.step_s)))
+    every = max(1, round(1.0 / (max(FORCES_HZ, LEAST_ROWS / length_s) * measurements.step_s)))
     thin = _thinned(measurements, every)
     m = max(8, round(length_s / thin.step_s))
     stride = max(1, round(stride_s / thin.step_s))

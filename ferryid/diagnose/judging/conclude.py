@@ -293,6 +293,7 @@ def survey_notes(log: ScreenedLog) -> tuple[str, ...]:
     )
     return (
         *survey.doubts,
+        *survey.averaged_out,
         *survey.left_out,
         *log.notes,
         *(one for one in survey.used.repairs if one.startswith(names)),

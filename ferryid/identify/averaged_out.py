@@ -1,0 +1,77 @@
+"""Whether the windows of the weak form are too long for a vessel: what it does within one is averaged out.
+
+The usual length follows from the vessel's, by Froude's law. A light boat whose controller swings the bow about within seconds
+answers its thrusters faster than that: of its yaw rate hardly anything is left in the windows, and what little is left is
+explained by any inertia, or without the thrusters at all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ferryid.effects.wording import listed
+from ferryid.identify.thresholds import IDENTIFY
+from ferryid.regression import window_starts, window_sums, window_weights
+from ferryid.signals.track import Motion, segments
+from ferryid.types import AXES, Flags, Floats
+from ferryid.vessel.dimensions import window_seconds
+from ferryid.vessel.profile import Profile
+
+SHORTER = (0.5, 0.25)
+"""Lengths that are tried instead, times the present one."""
+
+
+def averaged_out(profile: Profile, motions: Sequence[Motion]) -> tuple[str, ...]:
+    """Return a sentence on the axes whose motion windows average out, with the length to state; none where there are none.
+
+    An axis counts where the windows keep less than `IDENTIFY.least_kept` of the variance of its velocity, and of that of the
+    force that its actuators put on it: either alone may be noise.
+
+    Parameters
+    ----------
+    profile
+        The vessel.
+    motions
+        Logs of it.
+    """
+    usual_s = window_seconds(profile)
+    kept = kept_shares(motions, usual_s)
+    lost: Flags = np.max(kept, axis=0) < IDENTIFY.least_kept
+    if not lost.any():
+        return ()
+    tried = {share * usual_s: kept_shares(motions, share * usual_s).min(axis=0) for share in SHORTER}
+    better = [length for length, one in tried.items() if (one[lost] >= IDENTIFY.least_kept).all()]
+    length_s = max(better, default=min(tried))
+    if np.any(tried[length_s][lost] < IDENTIFY.shorter_keeps):
+        # What is gone in shorter ones as well is noise.
+        return ()
+    shares = [f"{100.0 * kept[0, k]:.0f} % in {axis}" for k, axis in enumerate(AXES) if lost[k]]
+    return (
+        f"The windows of {usual_s:.3g} s over which forces are averaged are long for these manoeuvres: they keep "
+        f"{listed(shares)} of the variance of the velocity, so that little is seen of what the actuators do. In the profile, "
+        f"window_s = {length_s:.2g} keeps more, for every command.",
+    )
+
+
+def kept_shares(motions: Sequence[Motion], length_s: float) -> Floats:
+    """Return the share of the variance of velocity, and of force, that means over windows keep, by axis, shape (2, 3).
+
+    One where nothing varies, and where no window fits.
+    """
+    means, rows = list[Floats](), list[Floats]()
+    for motion in motions:
+        both = np.hstack([motion.nu, motion.tau])
+        known = motion.valid & np.isfinite(both).all(axis=1)
+        m = round(length_s * motion.rate_hz)
+        starts, _ = window_starts(segments(known), m)
+        if m < IDENTIFY.fewest_rows or not len(starts):
+            continue
+        weight, _, _ = window_weights(m, 1.0 / motion.rate_hz)
+        means.append(window_sums(both, weight / motion.rate_hz, starts))
+        rows.append(both[known])
+    if not rows:
+        return np.ones((2, 3))
+    left, whole = (np.concatenate(some).var(axis=0) for some in (means, rows))
+    return np.where(whole > 0.0, left / np.where(whole > 0.0, whole, 1.0), 1.0).reshape(2, 3)
