@@ -41,6 +41,7 @@ from ferryid.diagnose.judging.locate import locate, locate_between
 from ferryid.diagnose.judging.posterior import Posterior, posterior_of
 from ferryid.diagnose.judging.verdict import Remainder, verdict_of
 from ferryid.types import AXES, Floats
+from ferryid.vessel import given_as
 from ferryid.vessel.circumstances import Circumstances
 
 TEN_MINUTES = {
@@ -108,7 +109,7 @@ def _with_origin(diagnosis: Diagnosis, log: AveragedLog, together: JudgedCampaig
     diagnosis = replace(
         diagnosis,
         path=log.path,
-        profile=screened.measurements.profile.given_as,
+        profile=given_as(screened.measurements.profile),
         repairs=screened.measured.survey.repairs,
     )
     if together is None:

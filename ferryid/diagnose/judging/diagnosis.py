@@ -121,7 +121,7 @@ class Diagnosis:
     path
         Of the log, as it was given.
     profile
-        Name or path that the vessel's profile is given by.
+        Name or path that the vessel's profile is given by; empty where it is known from a model alone.
     copies
         Logs of its campaign that are left out since they hold the motion of another: their paths and that of the other.
     likeness
