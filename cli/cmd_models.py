@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -10,6 +11,7 @@ import typer
 from ferryid.cli.completion import model_or_log
 from ferryid.cli.options import OUT, From, Json, ModelVessel, Out, ranges
 from ferryid.cli.output import emit, progress, tell
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 
 if TYPE_CHECKING:
@@ -39,7 +41,7 @@ def command(
     out: Out = OUT,
     json: Json = None,
 ) -> None:
-    """List the stored models and which is current, show one, or change which is current."""
+    """List the stored models and which is current, show the one whose name follows, or change which is current."""
     from ferryid import api
 
     first, *others = words or [""]
@@ -60,11 +62,17 @@ def command(
     elif first == "rollback" and others:
         emit(_rolled_back(others, out, to), json)
     elif others:
-        raise FerryIdError(
-            f"models: {first!r} is followed by {len(others)} more. Fix: name one model, or write promote or rollback before it"
-        )
+        raise FerryIdError(_too_many(first, others))
     else:
         emit(api.show_model(first, out) if first else api.models(out), json)
+
+
+def _too_many(first: str, others: list[str]) -> str:
+    """Return why more words than a model's name cannot be used, and what to write."""
+    what = f"models: takes the name of one model to show it, found {counted(1 + len(others), 'word')}, {first!r} first."
+    if len(others) == 1 and first in ("show", "list"):
+        return f"{what} Fix: write ferryid models {quote(others[0])}"
+    return f"{what} Fix: write ferryid models NAME, or promote or rollback before the name"
 
 
 def _rolled_back(names: list[str], out: Path, to: str | None) -> Outcome:

@@ -34,3 +34,9 @@ def verb(number: float, singular: str) -> str:
 def counted(number: int, noun: str) -> str:
     """Return a number with its noun: ``counted(1, "row")`` is "1 row", ``counted(2, "row")`` is "2 rows"."""
     return f"{number} {plural(number, noun)}"
+
+
+def per_cent(share: float) -> str:
+    """Return a share in two digits, and without a power of ten: ``per_cent(0.0057)`` is "0.57 %", ``per_cent(1.0)`` "100 %"."""
+    value = float(f"{100.0 * share:.2g}")
+    return f"{value:.0f} %" if abs(value) >= 10.0 else f"{value:g} %"

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from ferryid.counts import counted, plural, verb
+from ferryid.counts import counted, per_cent, plural, verb
 
 ROOT = Path(__file__).resolve().parents[1]
 NOUNS = (
@@ -101,3 +101,19 @@ def test_the_search_finds_what_it_looks_for(tmp_path: Path, monkeypatch: pytest.
     ]
     for line in ("{n} row{'s' * (n > 1)}", "{{ n }} row{{ 's' if n > 1 }}", "{n} line(s) skipped", "found 1 rows"):
         assert HAND_MADE.search(line)
+
+
+@pytest.mark.parametrize(
+    ("share", "text"),
+    [
+        (1.0, "100 %"),
+        (12.34, "1200 %"),
+        (0.0057, "0.57 %"),
+        (0.124, "12 %"),
+        (0.0, "0 %"),
+        (-1.0, "-100 %"),
+        (0.00012, "0.012 %"),
+    ],
+)
+def test_a_share_is_written_without_a_power_of_ten(share: float, text: str) -> None:
+    assert per_cent(share) == text

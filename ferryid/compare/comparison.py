@@ -88,6 +88,8 @@ class ComparedLog:
         Absolute errors of the free runs, shape (m, s, horizons, 4); NaN where a run did not get there.
     reached
         Horizons that lie within the stretch of a run, shape (s, horizons).
+    runnable
+        Models whose mass matrix allows free runs, shape (m,).
     paths, path_rows
         Where the free runs went north and east [m], shape (m, s, k, 2), and the rows of the log at these k times, shape (s, k);
         NaN where a run did not get there.
@@ -107,6 +109,7 @@ class ComparedLog:
     starts_s: Floats
     errors: Floats
     reached: Flags
+    runnable: Flags
     paths: Floats
     path_rows: Ints
     warnings: tuple[str, ...]
@@ -231,8 +234,9 @@ def _compare_log(
     errors = np.full((len(seen), len(starts), len(HORIZONS_S), len(KEYS)), np.nan)
     went: dict[int, Floats] = {}
     stride = 1
+    runnable = np.array([runs_free(prediction.force, prediction.motion) for prediction in seen])
     for k, prediction in enumerate(seen):
-        if len(starts) and runs_free(prediction.force, prediction.motion):
+        if len(starts) and runnable[k]:
             errors[k], went[k], stride = single_paths(prediction.force, prediction.motion, starts, ends, HORIZONS_S)
     paths = np.full((len(seen), len(starts), max((one.shape[1] for one in went.values()), default=0), 2), np.nan)
     for k, places in went.items():
@@ -262,6 +266,7 @@ def _compare_log(
         starts_s=motion.t[starts],
         errors=errors,
         reached=reached,
+        runnable=runnable,
         paths=paths,
         path_rows=path_rows,
         warnings=tuple(warnings),
@@ -333,7 +338,8 @@ def _models_that_run(candidates: Sequence[Candidate], compared: Sequence[Compare
         lost = 1.0 - came / reached
         runs[k] = lost <= COMPARE.diverged
         if not came:
-            notes.append(f"{one.label} is left out of free runs: {NO_MASS}, or all its runs diverge")
+            why = "all its runs diverge" if any(log.runnable[k] for log in compared) else NO_MASS
+            notes.append(f"{one.label} is left out of free runs: {why}")
         elif not runs[k]:
             notes.append(f"{one.label} is left out of free runs: {100.0 * lost:.0f} % of its runs diverge")
         elif lost:

@@ -47,7 +47,9 @@ def cannot(measurements: Measurements) -> str:
 
 def says(values: Values, instance: str | None) -> str:
     """Return the finding as a sentence."""
-    return f"The wind was gusty: {values['std']:.1f} m/s about its mean, a gust lasting some {values['time_constant']:.0f} s."
+    lasting_s = values["time_constant"]
+    lasting = f"{lasting_s:.0f}" if lasting_s >= 1.0 else f"{lasting_s:.1g}"
+    return f"The wind was gusty: {values['std']:.1f} m/s about its mean, a gust lasting some {lasting} s."
 
 
 def scenario(values: Values, instance: str | None) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.counts import per_cent
 from ferryid.export.exported import Exported
 from ferryid.export.names import legal, number, plain
 from ferryid.export.words import wrapped
@@ -109,7 +110,7 @@ def comment(lines: Iterable[str]) -> str:
 def shares(values: Mapping[str, float] | Floats) -> str:
     """Return shares of a force by axis: ``surge 1.2 %, sway 0.3 %, yaw 4 %``."""
     numbers = values.values() if isinstance(values, Mapping) else values.tolist()
-    return ", ".join(f"{axis} {100.0 * round(value, 5):.2g} %" for axis, value in zip(AXES, numbers, strict=True))
+    return ", ".join(f"{axis} {per_cent(round(value, 5))}" for axis, value in zip(AXES, numbers, strict=True))
 
 
 def inertial_lines(one: Inertial, added: Mapping[str, float] | None = None) -> list[str]:

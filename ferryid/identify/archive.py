@@ -20,7 +20,7 @@ from ferryid.identify.block_sum_store import StoredSums, load_block_sums
 from ferryid.identify.estimation import estimate_correction
 from ferryid.identify.excitation import SECTORS, sector_coverage
 from ferryid.identify.fit_data import Coefficients, Estimate, FitData
-from ferryid.identify.fit_warnings import general_warnings
+from ferryid.identify.fit_warnings import general_warnings, unused_window
 from ferryid.identify.inertia import axes_without_force
 from ferryid.identify.log_sums import pooled_deviation, pooled_mean_square
 from ferryid.identify.model_selection import select_model
@@ -273,6 +273,7 @@ class ArchiveData(FitData):
         auto = "The derivative's estimator was used, as auto does for an archive; --estimator weak uses the weak form."
         return [
             *([auto] if self.settings.estimator == "auto" else []),
+            *unused_window(self.settings, "it is what an archive is fitted with unless another is asked for"),
             *general_warnings(self.settings, excitation, scores, len(logs)),
             *log_warnings([(log.name, log.warnings) for log in logs]),
         ]

@@ -53,6 +53,13 @@ def fit_warnings(
     return tuple(warnings)
 
 
+def unused_window(settings: FitSettings, why: str) -> tuple[str, ...]:
+    """Return that a window of the weak form was given in vain: `why` is the reason for the derivative's estimator."""
+    if settings.weak_window_s is None:
+        return ()
+    return (f"--weak-window {settings.weak_window_s:g} had no effect, as the derivative's estimator was used: {why}.",)
+
+
 def general_warnings(settings: FitSettings, known: Excitation, scores: ModelScores, logs: int) -> list[str]:
     """Return what scores and excitation alone tell a reader to mind."""
     warnings = []

@@ -44,7 +44,7 @@ class Selection:
     @property
     def title(self) -> str:
         """What was chosen, in words."""
-        return f"{counted(self.components, 'component')} at a window of {self.window_s:g} s"
+        return f"{counted(self.components, 'component')} at a window of {self.window_s:.3g} s"
 
     @property
     def over_base(self) -> Floats:

@@ -19,7 +19,7 @@ from ferryid.identify.estimation import estimate_correction
 from ferryid.identify.estimators import choose_estimator
 from ferryid.identify.excitation import still_axes
 from ferryid.identify.fit_data import Coefficients, Estimate, FitData
-from ferryid.identify.fit_warnings import free_run_warnings, rest_warnings
+from ferryid.identify.fit_warnings import free_run_warnings, rest_warnings, unused_window
 from ferryid.identify.force_signs import refuse_reversed_forces
 from ferryid.identify.free_run_checks import free_run_checks
 from ferryid.identify.held_out_checks import held_out_checks, skill_checks
@@ -80,8 +80,17 @@ def fit_opened(
     """Fit a correction of a profile's hull to logs that were read and aligned; arguments and errors as of `fit_logs`."""
     chosen = estimator_for(opened, profile, settings, run)
     outcome = fit_and_judge(chosen.data, chosen.components, name, run)
-    told = (f"The derivative's estimator was used: {chosen.why}.",) if chosen.why else ()
+    told = [f"The derivative's estimator was used: {chosen.why}."] if chosen.why else []
+    if chosen.estimator == "derivative":
+        told += unused_window(settings, chosen.why or _preference(settings))
     return replace(outcome, warnings=(*outcome.warnings, *chosen.notes, *told), estimators=chosen.scores)
+
+
+def _preference(settings: FitSettings) -> str:
+    """Return why the derivative's estimator was used where the weak form could have been."""
+    if settings.estimator == "derivative":
+        return "it was asked for"
+    return "auto chose it by folds of the training rows; --estimator weak uses the weak form"
 
 
 @dataclass(frozen=True, eq=False)

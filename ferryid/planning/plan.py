@@ -409,9 +409,14 @@ def _believed(profile: Profile, model: Model | None) -> Profile:
             f"--model: {model.label} is a model of {own}, and the plan is for {profile.name}. Fix: give a model of that vessel"
         )
     if not model.hull:
+        what = (
+            "it was learned as a correction of the profile's hull"
+            if model.terms
+            else "its findings leave the profile's hull"
+        )
         raise FerryIdError(
-            f"--model: {model.label} brings no hull of its own, as fits correct the profile's. Fix: give a model that "
-            "ferryid diagnose stored, or leave --model out"
+            f"--model: {model.label} has no hull of its own to plan with: {what}. Fix: leave --model out and plan with the "
+            "profile's hull, or give a model whose hull a diagnosis has refitted: its file has a hull"
         )
     M, D = profile.hull.M.copy(), dict(profile.hull.D)
     places = {"m11": (0, 0), "m22": (1, 1), "m23": (1, 2), "m32": (2, 1), "m33": (2, 2)}

@@ -19,6 +19,7 @@ from ferryid.compare import (
 from ferryid.counts import counted
 from ferryid.effects import effects
 from ferryid.effects.wording import listed, titled
+from ferryid.regression import REGRESSION
 from ferryid.report.scale import scale_words
 from ferryid.types import AXES
 
@@ -209,11 +210,33 @@ def headline(result: ComparisonResult) -> str:
             kept += f"{listed(sorted(free))} {'is' if len(free) == 1 else 'are'} better. "
         elif shown:
             kept = _partly(result, on, kind, shown)
+        elif _undecided(result, on, kind):
+            kept = _too_little(result, scope)
         else:
             kept = "No fitted model is shown to be better than the profile's hull: keep the hull. "
     if not told:
         return f"{kept}No error could be compared on {title}."
     return f"{kept}Least {kind} error, {title}: {'; '.join(told)}."
+
+
+def _undecided(result: ComparisonResult, on: str | None, kind: str) -> bool:
+    """Tell whether models were held against their base model, none of them with an interval."""
+    known = [
+        row for row in result.statements
+        if (row.on, row.kind) == (on, kind) and BASE in (row.first, row.second) and isfinite(row.ratio)
+    ]  # fmt: skip
+    return bool(known) and not any(isfinite(row.low) for row in known)
+
+
+def _too_little(result: ComparisonResult, scope: CommonErrors) -> str:
+    """Return how much there is to decide about the base model by, and how much is needed."""
+    needed = counted(REGRESSION.paired_fewest_blocks, "block")
+    # Blocks of what windows predict are no shorter than two of them.
+    block_s = max(2.0 * result.prediction_window_s, *(log.block_s for log in result.logs))
+    return (
+        "Too little data to decide whether a fitted model is better than the profile's hull: an interval needs "
+        f"{needed} of {block_s:.3g} s, and {scope.seconds:.0f} s are compared. Give longer logs, or more of them. "
+    )
 
 
 def _partly(result: ComparisonResult, on: str | None, kind: str, shown: Sequence[Statement]) -> str:

@@ -247,6 +247,7 @@ def _log(
         "notes": diagnosis_words.notes_of(diagnosis, told),
         "least_sizes": least_sizes.rows(diagnosis),
         "proof": least_sizes.proof(diagnosis),
+        "proof_note": least_sizes.proof_note(diagnosis),
         "sources": second_sources.section(diagnosis.sources),
         "repairs": second_sources.repairs(diagnosis),
         # Of a campaign that of all logs is shown; the JSON has each log's own.

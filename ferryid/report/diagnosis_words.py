@@ -14,6 +14,7 @@ from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.effects.wording import IS_A_HINT, listed, parameter_word, timed, titled, uncapitalised
 from ferryid.report import least_sizes
 from ferryid.report.diagnosis_errors import fitted, ratio_of
+from ferryid.report.evaluation_text import NOT_ACCEPTED
 from ferryid.types import AXES
 
 EVERYWHERE = "all along"
@@ -392,7 +393,8 @@ def new_model(diagnosis: Diagnosis) -> str:
     learned = diagnosis.learned
     alone = learned is not None and (diagnosis.posterior is None or learned.fit_alone)
     what = "The model that was learned is" if alone else "The model with the findings is"
-    return f"{what} {label}, which is {diagnosis.model}; use it with: ferryid evaluate {label} LOG{where}"
+    told = "use it with" if diagnosis.model_accepted else f"it is {NOT_ACCEPTED}. Judge it on a log of another day with"
+    return f"{what} {label}, which is {diagnosis.model}; {told}: ferryid evaluate {label} LOG{where}"
 
 
 def model_of_all(diagnoses: Sequence[Diagnosis]) -> str:

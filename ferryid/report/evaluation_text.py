@@ -12,6 +12,10 @@ from ferryid.types import AXES
 _ROWS = ("row by row, MSE / base", "  rms error, {} [N, N, N·m]", "  R², model")
 _WINDOWS = ("squared prediction error / base", "  rms, {} [N, N, N·m]", "  R², model")
 HULL = "the profile's hull"
+NOT_ACCEPTED = (
+    "marked as rejected: the diagnosis stored it without accepting it, so that it did not become the current one"
+)
+"""What a model is that a diagnosis led to and did not accept, alike where it is stored and where it is judged."""
 _BESIDE_HULL = "  squared error / profile's hull"
 
 
@@ -19,9 +23,7 @@ def render_evaluation(result: dict[str, Any]) -> str:
     """Return an evaluation as text."""
     head = result["model"]
     lines = [f"{head['name']}@{head['version']}, test data smoothed with {result['window_s']:g} s"]
-    lines += (
-        [] if head.get("accepted", True) else ["warning: this model is marked as rejected, as its fit was not accepted"]
-    )
+    lines += [] if head.get("accepted", True) else [f"warning: {_rejected(diagnosed='base' in head)}"]
     lines += [f"base: {head['base']}"] if "base" in head else []
     scale = scale_words(head.get("scale", {}))
     if scale and "base" not in head:
@@ -54,6 +56,13 @@ def render_evaluation(result: dict[str, Any]) -> str:
     if pooled.get("windows"):
         lines += ["", *_explained(pooled["window_s"], "base" in head)]
     return "\n".join(lines)
+
+
+def _rejected(*, diagnosed: bool) -> str:
+    """Return what it means that a model was not accepted."""
+    if diagnosed:
+        return f"this model is {NOT_ACCEPTED}. Use it only where its errors below are the smaller ones"
+    return "this model is marked as rejected, as its fit was not accepted"
 
 
 def _score_lines(scores: dict[str, Any], labels: tuple[str, str, str]) -> list[str]:

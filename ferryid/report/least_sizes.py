@@ -10,6 +10,8 @@ from ferryid.diagnose.judging import Diagnosis, LeastSize
 from ferryid.effects import effects
 from ferryid.effects.wording import uncapitalised
 
+PROFILE = "PROFILE.toml"
+"""In the place of a profile whose file only the reader knows."""
 SHOWN = 5
 """Effects on a terminal: the page and the JSON have all."""
 
@@ -42,7 +44,8 @@ def line(diagnosis: Diagnosis) -> str:
 def proof(diagnosis: Diagnosis) -> str:
     """Return the command that measures such sizes in the log itself; empty where nothing would be seen at any size.
 
-    Errors of sensors can be concealed in any record, loads only where the actuators push freely on every axis.
+    `PROFILE` stands in it where nothing that is known leads to the vessel's profile. Errors of sensors
+    can be concealed in any record, loads only where the actuators push freely on every axis.
     """
     seen = list(dict.fromkeys(one.effect for one in diagnosis.least_sizes if one.value is not None))
     known = effects()
@@ -50,8 +53,13 @@ def proof(diagnosis: Diagnosis) -> str:
     wanted = of_sensors[:2] or [name for name in ("wind", "payload") if name in seen] or seen[:2]
     if not wanted:
         return ""
-    recording, vessel = quote(diagnosis.path or diagnosis.log), quote(diagnosis.profile or diagnosis.vessel)
+    recording, vessel = quote(diagnosis.path or diagnosis.log), quote(diagnosis.profile or PROFILE)
     return f"ferryid prove --real {recording} --vessel {vessel} --only {','.join(wanted)}"
+
+
+def proof_note(diagnosis: Diagnosis) -> str:
+    """Return what the reader puts into that command; empty where it runs as it stands."""
+    return "" if diagnosis.profile else f", with the file of the profile {diagnosis.vessel} in the place of {PROFILE}"
 
 
 def _name(one: LeastSize) -> str:

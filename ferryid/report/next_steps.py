@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from shlex import join
+from pathlib import PurePath
+from shlex import join, quote
 
 Step = tuple[str, str]
 """What it is for, and the command."""
@@ -12,12 +13,20 @@ LOG = "LOG"
 """In the place of a log that only the reader knows."""
 
 
-def vessel_option(command: Sequence[str]) -> str:
-    """Return how a command was told its vessel, to be told so again; empty where it found it by itself."""
-    for word, following in pairwise(command):
-        if word == "--vessel":
+def _option(command: Sequence[str], option: str) -> str:
+    """Return an option of a command with its value, written as its own word or after an equals sign; empty without it."""
+    for word, following in pairwise([*command, ""]):
+        if word == option:
             return f" {join([word, following])}"
+        if word.startswith(f"{option}="):
+            return f" {quote(word)}"
     return ""
+
+
+def _given_log(names: Sequence[str], command: Sequence[str]) -> str:
+    """Return the one file of a command, by its path there; `LOG` for several, and for what lies in other files."""
+    paths = [word for word in command if PurePath(word).name in names]
+    return join(paths) if len(names) == len(paths) == 1 else LOG
 
 
 def after_fit(label: str, accepted: bool, logs: Sequence[str], command: Sequence[str]) -> list[Step]:
@@ -28,12 +37,14 @@ def after_fit(label: str, accepted: bool, logs: Sequence[str], command: Sequence
     label, accepted
         Name with version of the model, and verdict.
     logs
-        Files that it was fitted to.
+        Names of the files that it was fitted to.
     command
         The words of the fit.
     """
-    vessel = vessel_option(command)
-    trained = join(logs) if len(logs) == 1 else LOG
+    vessel = _option(command, "--vessel")
+    # A model is looked for where it was stored.
+    stored = _option(command, "--out")
+    trained = _given_log(logs, command)
     lacks = ("See which physics the model lacks", f"ferryid diagnose {trained}{vessel}")
     if not accepted:
         return [
@@ -42,16 +53,16 @@ def after_fit(label: str, accepted: bool, logs: Sequence[str], command: Sequence
             ("Choose its settings by cross-validation", f"ferryid sweep both {trained}{vessel}"),
         ]
     return [
-        ("Judge it on the log of another day", f"ferryid evaluate {label} {LOG}"),
+        ("Judge it on the log of another day", f"ferryid evaluate {label} {LOG}{stored}"),
         lacks,
-        ("See its coefficients with intervals", f"ferryid models {label}"),
-        ("Use it in another program", f"ferryid export {label} --to python"),
+        ("See its coefficients with intervals", f"ferryid models {label}{stored}"),
+        ("Use it in another program", f"ferryid export {label} --to python{stored}"),
     ]
 
 
 def after_sweep(options: Sequence[str], beats_base: bool, command: Sequence[str]) -> list[Step]:
     """Return what follows a sweep: a fit with its choice, or the search for what the base model lacks."""
-    vessel = vessel_option(command)
+    vessel = _option(command, "--vessel")
     fit = ("Fit with the choice", f"ferryid fit {LOG}{vessel} {join(options)}")
     lacks = ("See which physics the base model lacks", f"ferryid diagnose {LOG}{vessel}")
     return [fit, lacks] if beats_base else [lacks]

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.counts import counted
+from ferryid.counts import counted, verb
 from ferryid.identify import FitOutcome, LogFit
 from ferryid.models import RANGE_UNITS, ForceScores
 from ferryid.models.forces import effective_mass
@@ -360,10 +360,14 @@ def _excitation_lines(result: FitOutcome) -> list[str]:
     lines = []
     if values.size and values[0] > 0:
         weak = int(np.sum(values < 1e-3 * values[0]))
+        # Less than rounding leaves of the strongest is nothing.
+        nothing = values[-1] <= np.finfo(float).eps * len(values) * values[0]
+        excited = (
+            "not excited at all" if nothing else f"excited {values[-1] / values[0]:.2g} times as much as the strongest"
+        )
         lines.append(
-            f"{counted(len(values), 'basis term')}; the weakest combination is excited "
-            f"{values[-1] / values[0]:.1e} times as much "
-            f"as the strongest, and {weak} are below a thousandth."
+            f"{counted(len(values), 'basis term')}; the weakest combination is {excited}, and {weak} "
+            f"{verb(weak, 'is')} below a thousandth of the strongest."
         )
     if np.isfinite(excitation.heading_coverage):
         lines.append(f"Headings cover {100.0 * excitation.heading_coverage:.0f} % of twelve 30° sectors.")

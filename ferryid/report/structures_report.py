@@ -88,7 +88,7 @@ def render(
         axes=AXES,
         block_s=f"{found.block_s:.3g}",
         window_s=f"{found.settings.window_s:g}",
-        test_window_s=f"{plain['test_window_s']:g}",
+        test_window_s=f"{plain['test_window_s']:.3g}",
         settings=plain["settings"],
         found=found,
         next=after_sweep(

@@ -63,7 +63,7 @@ def heat_cells(found: Sweep, choice: Selection) -> HeatMap:
         told = ", ".join(f"{axis} {value:.4g}" for axis, value in ratios if np.isfinite(value))
         marks = ", within one standard error of the least" if near[window, count] else ""
         says = (
-            f"{'Choice: ' if chosen else ''}{counted(count + 1, 'component')} at {found.windows_s[window]:g} s: score "
+            f"{'Choice: ' if chosen else ''}{counted(count + 1, 'component')} at {found.windows_s[window]:.3g} s: score "
             f"{score[window, count]:.4f} ± {band[window, count]:.4f}{marks}. MSE over base model's: {told}."
         )
         fill = to_hex(colours(float(norm(max(float(excess[window, count]), least)))))

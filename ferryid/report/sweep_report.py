@@ -108,7 +108,7 @@ def render(found: Sweep, command: Sequence[str] = (), interactive: Interactive =
         logs=[{**log, "seconds": f"{log['seconds']:.0f}"} for log in found.logs],
         sections=sections,
         axes=AXES,
-        test_window_s=f"{found.test_window_s:g}",
+        test_window_s=f"{found.test_window_s:.3g}",
         weak=found.weak,
         error=found.error,
         tested=found.tested,

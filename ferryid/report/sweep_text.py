@@ -42,7 +42,7 @@ def _table(found: Sweep, choice: Selection) -> list[str]:
     score, band = choice.curves.normalised()
     windows, counts = range(len(found.windows_s)), range(score.shape[1])
     if found.what == "window":
-        cells = [(window, choice.components - 1, f"{found.windows_s[window]:g} s") for window in windows]
+        cells = [(window, choice.components - 1, f"{found.windows_s[window]:.3g} s") for window in windows]
     else:
         cells = [(choice.window, count, f"{count + 1}") for count in counts]
     title = "window" if found.what == "window" else "components"
@@ -60,7 +60,7 @@ def _table(found: Sweep, choice: Selection) -> list[str]:
 def _matrix(found: Sweep, choice: Selection) -> list[str]:
     """Return a line for each component count, a column for each window."""
     score, near = choice.curves.normalised()[0], choice.curves.near()
-    lines = ["  components" + "".join(f"{window_s:>9g} s" for window_s in found.windows_s)]
+    lines = ["  components" + "".join(f"{window_s:>9.3g} s" for window_s in found.windows_s)]
     for count in range(score.shape[1]):
         cells = []
         for window in range(len(found.windows_s)):

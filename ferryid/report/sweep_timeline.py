@@ -44,7 +44,11 @@ def _by_window(found: Sweep, choice: Selection) -> tuple[Strip, ...]:
     def traces(values: Floats) -> tuple[Trace, ...]:
         return tuple(
             Trace(
-                f"{window_s:g} s", values[k], f"c{k % PALETTE}", dash=(5.0, 3.0) if k >= PALETTE else (), style="marked"
+                f"{window_s:.3g} s",
+                values[k],
+                f"c{k % PALETTE}",
+                dash=(5.0, 3.0) if k >= PALETTE else (),
+                style="marked",
             )
             for k, window_s in enumerate(found.windows_s)
         )

@@ -65,6 +65,20 @@ def load_profile(name_or_path: str | Path) -> Profile:
     return parse_profile(text, where)
 
 
+def given_as(profile: Profile) -> str:
+    """Return what commands take for a profile: the path of its file, or its name; empty where neither leads to its text.
+
+    That of a model may be known by the file alone that the model was fitted with.
+    """
+    for name in (profile.path, profile.name):
+        try:
+            if _source(name)[0] == profile.text:
+                return name
+        except FerryIdError:
+            continue
+    return ""
+
+
 @lru_cache(maxsize=16)
 def parse_profile(text: str, where: str) -> Profile:
     """Parse the text of a profile; `where` names it in messages and becomes `Profile.path`.

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf, nan
-from pathlib import Path
 
 from ferryid.ingest.log import TableLayout
 from ferryid.types import Floats
@@ -173,11 +172,6 @@ class Profile:
     sha256: str
     setting: str = ""
     window_s: float = nan
-
-    @property
-    def given_as(self) -> str:
-        """What commands take for it: the path of its file, or its name where it has none, as a bundled one."""
-        return self.path if Path(self.path).is_file() else self.name
 
     @property
     def measures_sway(self) -> bool:

@@ -98,7 +98,7 @@ def survey(profile: Profile, topics: Sequence[Topic], losses: Sequence[Loss] = (
         paths = wanted.setdefault(topic.name, [])
         paths.extend(path for path in _read_fields(signal, topic) if path not in paths)
         columns = canonical_columns(signal)
-        shown = signal.fields if len(columns) == len(signal.fields) else (", ".join(signal.fields),)
+        shown = _in_column_order(signal) if len(columns) == len(signal.fields) else (", ".join(signal.fields),)
         chosen = "" if signal.element is None else f" of {signal.element[1]}"
         found.update({column: f"{topic.name}: {path}{chosen}" for column, path in zip(columns, shown, strict=True)})
     notes = tuple(order_note(name, role) for name, role in _orders_instead(profile, missing))
@@ -289,6 +289,12 @@ def _check_turns(profile: Profile, signal: Signal, values: list[Floats]) -> None
         f"stays within {turn:.4g} and jumps by as much {counted(jumps, 'time')}, as {other} do at a full "
         "turn. Fix: correct the unit"
     )
+
+
+def _in_column_order(signal: Signal) -> tuple[str, ...]:
+    """Return the fields of a signal in the order of the columns that `convert` makes of them, one each."""
+    turned = signal.frame == "ENU" and len(signal.fields) == 2
+    return signal.fields[::-1] if turned else signal.fields
 
 
 def _scalar(signal: Signal, values: Floats, scale: float) -> Floats:

@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.counts import counted
+from ferryid.counts import counted, per_cent
 from ferryid.errors import FerryIdError
 from ferryid.types import Floats
 from ferryid.vessel.profile import Actuator, Profile, ThrustCurve
@@ -180,7 +180,7 @@ def speed_doubts(profile: Profile, columns: Mapping[str, Floats]) -> tuple[str, 
             continue
         if turning.size == 0:
             told.append(
-                f"{name} never turned faster than {fastest:.3g} rpm, {100.0 * fastest / limit:.2g} % of what its thrust curve "
+                f"{name} never turned faster than {fastest:.3g} rpm, {per_cent(fastest / limit)} of what its thrust curve "
                 "covers: if it did not rest all the time, correct the unit of its speed."
             )
         # The highest value may be one that stands for none.

@@ -40,6 +40,17 @@ def drawn(run, out: Path) -> dict:
     return result
 
 
+@pytest.mark.parametrize(
+    ("words", "remedy"),
+    [
+        (("show", "nwork"), "Fix: write ferryid models nwork (docs"),
+        (("show", "a", "b"), "Fix: write ferryid models NAME, or promote or rollback before the name"),
+    ],
+)
+def test_words_after_models_that_are_no_name_get_the_command_that_shows_one(ferryid, words, remedy: str) -> None:
+    refused(ferryid("models", *words), f"found {len(words)} words, 'show' first. {remedy}")
+
+
 @pytest.mark.parametrize("command", ["inspect", "ingest", "fit"])
 @pytest.mark.parametrize(
     ("name", "content"),

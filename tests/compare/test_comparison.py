@@ -15,6 +15,7 @@ from ferryid.compare.comparison_result import ComparisonResult
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json
 from ferryid.models.model import Model, blank_model
+from ferryid.models.prediction.free_run import NO_MASS
 from ferryid.models.prediction.log_prediction import predict
 from ferryid.models.prediction.window_averages import window_errors
 from ferryid.models.scores import usable_rows
@@ -282,11 +283,19 @@ def test_a_model_that_cannot_be_run_free_is_left_out_of_free_runs_alone(folder: 
     theta[backwards.terms.index("v_dot"), 1] = -9000.0
     field = select_candidates(["ferry@1", "odd"], [heavier(1, 1.1), replace(backwards, theta=theta)])
     result = compare(field, logs_in(folder)[:1], RunContext(folder / "out")).result
-    assert any("milliampere@3 is left out of free runs" in warning for warning in result.warnings)
+    (warning,) = (one for one in result.warnings if "free runs" in one)
+    assert warning == f"milliampere@3 is left out of free runs: {NO_MASS}"
     scores = result.logs[0].scores
     assert np.isnan(scores["milliampere@3"].free_run["position_m"]).all()
     assert np.isfinite(scores["ferry@1"].free_run["position_m"]).all()
     assert np.isfinite(scores["milliampere@3"].mse["yaw"])
+
+
+def test_a_model_all_of_whose_runs_diverge_is_left_out_for_that(folder: Path) -> None:
+    field = select_candidates(["ferry@1", "light"], [heavier(1, 1.1), replace(heavier(3, 1e-3), name="light")])
+    result = compare(field, logs_in(folder)[:1], RunContext(folder / "out")).result
+    (warning,) = (one for one in result.warnings if "free runs: " in one)
+    assert warning == "light@3 is left out of free runs: all its runs diverge"
 
 
 def test_without_logs_coefficients_are_compared(field: CandidateSet, tmp_path: Path) -> None:

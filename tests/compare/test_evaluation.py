@@ -20,7 +20,7 @@ from ferryid.models.forces.estimator import base_estimator, model_estimator
 from ferryid.models.prediction import Prediction, window_averages, window_errors
 from ferryid.models.scores import force_scores
 from ferryid.regression.bases import make_basis
-from ferryid.report.evaluation_text import render_evaluation
+from ferryid.report.evaluation_text import NOT_ACCEPTED, render_evaluation
 from ferryid.report.headline import headline_of
 from ferryid.signals.prepare import prepare
 from ferryid.types import AXES, RunContext
@@ -238,3 +238,9 @@ def test_a_rejected_model_is_not_judged_without_a_word() -> None:
     head = {**HEAD, "logs": []}
     assert warning in render_evaluation({**head, "model": {**HEAD["model"], "accepted": False}}).splitlines()
     assert warning not in render_evaluation({**head, "model": {**HEAD["model"], "accepted": True}})
+    diagnosed = render_evaluation({**head, "model": {**HEAD["model"], "accepted": False, "base": "the hull"}})
+    assert warning not in diagnosed
+    assert (
+        f"warning: this model is {NOT_ACCEPTED}. Use it only where its errors below are the smaller ones"
+        in diagnosed.splitlines()
+    )

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from ferryid.identify.fit_warnings import free_run_warnings, general_warnings, rest_warnings
 from ferryid.identify.outcome import Excitation
+from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.settings import FitSettings
 from ferryid.models import ForceScores, ModelScores
 from ferryid.models.prediction.free_run import FreeRun
+from ferryid.types import RunContext
+from ferryid.vessel import load_profile
+
+SHORT = Path(__file__).resolve().parents[2] / "fixtures" / "short.mcap"
 
 
 def run(position: float, heading: float, starts: int = 5, note: str = "") -> FreeRun:
@@ -72,3 +79,18 @@ def test_a_constant_force_that_counts_beside_the_damping_is_said_with_axis_and_s
     )
     assert rest_warnings(lambda nu: 40.0 * nu, visited) == ()
     assert rest_warnings(force, visited[2:]) == ()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("estimator", "window_s", "why"),
+    [("derivative", 0.9, "it was asked for."), ("auto", 60.0, "the weak form needs "), ("weak", 0.9, None)],
+)
+def test_a_window_of_the_weak_form_that_has_no_effect_is_told(
+    estimator: str, window_s: float, why: str | None, tmp_path: Path
+) -> None:
+    settings = FitSettings(draws=1, estimator=estimator, weak_window_s=window_s)
+    found = fit_logs([str(SHORT)], load_profile("milliampere"), settings, RunContext(tmp_path))
+    told = [one for one in found.warnings if "had no effect" in one]
+    wanted = f"--weak-window {window_s:g} had no effect, as the derivative's estimator was used: {why}"
+    assert [one.startswith(wanted) for one in told] == ([] if why is None else [True])

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from ferryid.errors import FerryIdError
 from ferryid.identifiability.trial import sailing
+from ferryid.models import blank_model
 from ferryid.planning import Plan, PlanSettings, plan
 from ferryid.planning.limits import room_of, within
 from ferryid.planning.plan import Expected
@@ -46,6 +50,21 @@ def test_the_room_of_a_path_is_that_of_the_hull() -> None:
 
 
 VESSEL = load_profile("milliampere")
+
+
+@pytest.mark.parametrize(
+    ("terms", "why"),
+    [
+        (("u",), "it was learned as a correction of the profile's hull"),
+        ((), "its findings leave the profile's hull"),
+    ],
+)
+def test_a_model_without_a_hull_says_why_it_has_none(terms: tuple[str, ...], why: str) -> None:
+    model = replace(blank_model(VESSEL, "ferry"), version=1, terms=terms)
+    with pytest.raises(
+        FerryIdError, match=rf"ferry@1 has no hull of its own to plan with: {why}. Fix: leave --model out"
+    ):
+        plan(VESSEL, (), PlanSettings(model=model), IN_MEMORY)
 
 
 @pytest.mark.parametrize(

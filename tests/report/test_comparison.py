@@ -157,6 +157,17 @@ def test_the_headline_says_who_errs_least_and_how_surely(p: float, told: str) ->
     assert "keep the hull" not in comparison_words.headline(result(("one", "two"), p))
 
 
+def test_the_headline_does_not_keep_a_hull_that_too_little_data_are_held_against() -> None:
+    found = result(("one", BASE), nan)
+    none = tuple(replace(row, low=nan, high=nan, better=None) for row in found.statements)
+    headline = comparison_words.headline(replace(found, statements=none))
+    assert headline == (
+        "Too little data to decide whether a fitted model is better than the profile's hull: an interval needs 8 blocks of "
+        "30 s, and 1 s are compared. Give longer logs, or more of them. "
+        "Least prediction error, log: one on surge, sway and yaw, with too little data to decide."
+    )
+
+
 def test_the_headline_says_on_which_axes_a_model_is_better_than_the_base_model() -> None:
     found = result(("one", BASE), 0.001)
     assert BASE not in comparison_words.headline(found)

@@ -43,6 +43,7 @@ from ferryid.report.diagnosis_words import (
     changed,
     estimate,
     headline,
+    new_model,
     numbers,
     rivals,
     said,
@@ -50,6 +51,7 @@ from ferryid.report.diagnosis_words import (
     trust,
     where,
 )
+from ferryid.report.evaluation_text import NOT_ACCEPTED
 from ferryid.report.figures import STYLE, canvas
 from ferryid.report.least_sizes import proof
 from ferryid.types import AXES
@@ -829,3 +831,11 @@ def test_a_law_is_in_the_json(tmp_path: Path) -> None:
 )
 def test_a_value_without_an_interval_has_three_digits(value: float, told: str) -> None:
     assert estimate(Estimate(value, value, value, "N")) == told
+
+
+def test_a_model_that_was_not_accepted_is_to_be_judged_before_it_is_used() -> None:
+    made = Diagnosis("log", "ferry", "deviation", (), {}, {}, model="ferryid-out/models/g/2.json")
+    assert new_model(made).endswith("2.json; use it with: ferryid evaluate g@2 LOG")
+    assert new_model(replace(made, model_accepted=False)).endswith(
+        f"it is {NOT_ACCEPTED}. Judge it on a log of another day with: ferryid evaluate g@2 LOG"
+    )

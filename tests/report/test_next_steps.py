@@ -50,6 +50,16 @@ def test_several_logs_are_not_named() -> None:
     assert all("--vessel" not in command for _, command in after_fit("ferry@1", False, ["a.mcap"], ()))
 
 
+@pytest.mark.parametrize("told", [("--out", "sea trials"), ("--out=sea trials",)])
+def test_commands_find_the_log_and_the_model_where_the_fit_did(told: tuple[str, ...]) -> None:
+    command = ("ferryid", "fit", "logs/a.mcap", *told)
+    judge, lacks, *others = (split(step) for _, step in after_fit("ferry@1", True, ["a.mcap"], command))
+    assert lacks[2:] == ["logs/a.mcap"]
+    assert all(words[-len(told) :] == list(told) for words in (judge, *others))
+    # A fit of an archive has no path of a log in its words.
+    assert split(after_fit("ferry@1", False, ["a.mcap"], ("ferryid", "fit", "--archive"))[0][1])[2:] == ["LOG"]
+
+
 def test_every_section_has_a_link() -> None:
     page = with_contents(f"{CONTENTS}<h2>One &amp; two</h2><p>x</p><h2>Three</h2>")
     assert re.findall(r'<a href="#([\w-]+)">(.*?)</a>', page) == [

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ferryid.vessel import bundled, check_profile, describe, load_profile
+from ferryid.vessel import bundled, check_profile, describe, given_as, load_profile, parse_profile
 
 
 @pytest.mark.parametrize("name", bundled())
@@ -39,7 +39,12 @@ def test_description_names_every_part(name: str) -> None:
 
 def test_a_profile_is_given_by_its_file_or_by_its_name(tmp_path: Path) -> None:
     bundled = load_profile("milliampere")
-    assert bundled.given_as == "milliampere"
+    assert given_as(bundled) == "milliampere"
     own = tmp_path / "vessel.toml"
     own.write_text(bundled.text, encoding="utf-8")
-    assert load_profile(own).given_as == str(own)
+    assert given_as(load_profile(own)) == str(own)
+    # A model brings its profile along under its own name: what no file and no name leads to is no word for a command.
+    inside = bundled.text.replace('name = "milliampere"', 'name = "gu"')
+    assert given_as(parse_profile(bundled.text, "a-model")) == "milliampere"
+    assert given_as(parse_profile(inside, "a-model")) == ""
+    assert given_as(parse_profile(bundled.text + "\n# Changed.", "a-model")) == ""

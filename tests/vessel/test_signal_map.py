@@ -108,6 +108,15 @@ def test_wanted_fields_are_those_of_the_map_only() -> None:
     assert list(selection.missing) == ["t1.speed.command"]
 
 
+def test_columns_of_an_enu_frame_name_the_field_that_each_comes_from() -> None:
+    nav = topic("/nav", e="float64", n="float64", ve="float64", vn="float64", yaw="float64")
+    found = survey(profile(WORLD), [nav, T1]).found
+    values = convert(profile(WORLD), series("/nav", e=[3.0], n=[1.0], ve=[0.3], vn=[0.1], yaw=[0.0]))
+    assert (found["x"], found["y"]) == ("/nav: n", "/nav: e")
+    assert (found["vel_N"], found["vel_E"]) == ("/nav: vn", "/nav: ve")
+    assert (values["vel_N"][0], values["vel_E"][0]) == (0.1, 0.3)
+
+
 def test_misspelt_topic_gets_a_suggestion() -> None:
     with pytest.raises(FerryIdError) as caught:
         select(profile(BODY), [topic("/nav2", u="float64"), T1], "a.bag")

@@ -40,7 +40,9 @@ from ferryid.diagnose.judging.likeness import likeness_of_logs
 from ferryid.diagnose.judging.locate import locate, locate_between
 from ferryid.diagnose.judging.posterior import Posterior, posterior_of
 from ferryid.diagnose.judging.verdict import Remainder, verdict_of
+from ferryid.signals.time_ranges import ranges_of
 from ferryid.types import AXES, Floats
+from ferryid.vessel import given_as
 from ferryid.vessel.circumstances import Circumstances
 
 TEN_MINUTES = {
@@ -108,7 +110,7 @@ def _with_origin(diagnosis: Diagnosis, log: AveragedLog, together: JudgedCampaig
     diagnosis = replace(
         diagnosis,
         path=log.path,
-        profile=screened.measurements.profile.given_as,
+        profile=given_as(screened.measurements.profile),
         repairs=screened.measured.survey.repairs,
     )
     if together is None:
@@ -285,6 +287,14 @@ def remedies(log: ScreenedLog, findings: Sequence[Finding]) -> tuple[str, ...]:
     return tuple(notes)
 
 
+def origin_note(sha256: str) -> tuple[str, ...]:
+    """Return where the times of a diagnosis begin, for the hash of a recording whose start was cut off; else nothing."""
+    ranges = ranges_of(sha256)
+    if not ranges or ranges[0][0] <= 0.0:
+        return ()
+    return (f"Times are from the start of what was selected, {round(ranges[0][0], 1):.10g} s into the log.",)
+
+
 def survey_notes(log: ScreenedLog) -> tuple[str, ...]:
     """Return what was noted of a log as it was read: doubts, rows left out, and actuators that leave their thrust curves."""
     survey = log.measured.survey
@@ -295,6 +305,7 @@ def survey_notes(log: ScreenedLog) -> tuple[str, ...]:
         *survey.doubts,
         *survey.averaged_out,
         *survey.left_out,
+        *origin_note(survey.recording.sha256),
         *log.notes,
         *(one for one in survey.used.repairs if one.startswith(names)),
     )

@@ -92,6 +92,8 @@ class Diagnosis:
         Sentences for the reader: what was not tested and why, what is left in the residual.
     model
         Path of the model with the findings in it.
+    model_accepted
+        Whether that may become the current one of its name.
     evidence
         What was left over in the whole log, one row a window: ``t`` [s], shape (m,); ``before``, ``after`` [N, N, N·m],
         shape (m, 3); optionally what was measured, ``heading`` [deg] and ``speed`` [m/s], shape (m,), ``place`` north and
@@ -121,7 +123,7 @@ class Diagnosis:
     path
         Of the log, as it was given.
     profile
-        Name or path that the vessel's profile is given by.
+        Name or path that the vessel's profile is given by; empty where it is known from a model alone.
     copies
         Logs of its campaign that are left out since they hold the motion of another: their paths and that of the other.
     likeness
@@ -148,6 +150,7 @@ class Diagnosis:
     after: Mapping[str, Any]
     notes: tuple[str, ...] = ()
     model: str | None = None
+    model_accepted: bool = True
     evidence: Mapping[str, Floats] = field(default_factory=dict)
     withheld: tuple[Withheld, ...] = ()
     against: Mapping[str, Any] = field(default_factory=dict)

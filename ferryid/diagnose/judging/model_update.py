@@ -96,6 +96,7 @@ def store_updated_model(
         replace(
             one,
             model=path if one.posterior or everywhere else None,
+            model_accepted=made is None or made.accepted,
             notes=(*one.notes, *(one.posterior.notes if one.posterior else ()), *notes),
         )
         if one.posterior or learned

@@ -12,7 +12,7 @@ from math import exp
 
 import numpy as np
 
-from ferryid.counts import counted
+from ferryid.counts import counted, per_cent
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.candidate_terms import FORCE, Term
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fit, fitted_force_model, rest_of
@@ -221,7 +221,7 @@ def _lawful(law: Law, kept: Fit, measurements: Measurements, whose: str, moves: 
     regressor = (size, first.value(force_model)) if size else None
     parts = [one.says for one in terms]
     if moves:
-        sizes = [f"{100.0 * share:.2g} % of the measured acceleration" for share in moves]
+        sizes = [f"{per_cent(share)} of the measured acceleration" for share in moves]
         parts = [f"{one}, up to {size}" for one, size in zip(parts, sizes, strict=True)]
     listing = "; ".join(parts)
     return Finding(

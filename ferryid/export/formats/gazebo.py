@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.counts import per_cent
 from ferryid.export.exported import Exported
 from ferryid.export.format import Format
 from ferryid.export.names import number, plain
@@ -271,7 +272,7 @@ def _of_thrusters(one: Exported) -> Iterator[str]:
         if curve is not None:
             yield (
                 f"{plain(actuator.name)}: the speed of its blades follows a square law, which errs by up to "
-                f"{100.0 * curve[3]:.2g} % of the greatest thrust; thrust itself is what is ordered"
+                f"{per_cent(curve[3])} of the greatest thrust; thrust itself is what is ordered"
             )
         if actuator.kind == "propeller_rudder":
             yield f"{plain(actuator.name)}: its rudder is not exported; the plugin has none"

@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from ferryid.counts import per_cent
 from ferryid.diagnose.inference.candidate_terms import Term, terms_of
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, estimation_problem, fit
 from ferryid.diagnose.inference.prior import prior_force_model
@@ -138,7 +139,7 @@ def test_a_law_of_all_logs_is_told_in_each_of_them_and_fitted_to_the_others() ->
         finding = claim.finding
         assert finding.sure
         assert "that holds in all 3 logs that can show it" in finding.says
-        assert finding.says.endswith(f", up to {100.0 * law.moves[0]:.2g} % of the measured acceleration.")
+        assert finding.says.endswith(f", up to {per_cent(law.moves[0])} of the measured acceleration.")
         assert finding.improvement["yaw"] > 0.05
         assert finding.law[0].coefficient.low < SIZE < finding.law[0].coefficient.high
 

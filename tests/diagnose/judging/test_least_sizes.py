@@ -88,6 +88,9 @@ def test_a_terminal_has_a_line_on_the_largest_of_several_thrusters() -> None:
         "would not have been seen here: steady wind below 1.1 m/s, thruster force at any size, other0 below 12 %, other1 below "
         "12 %, other2 below 12 % (and 2 effects more in the report)"
     )
-    assert shown.proof(made) == "ferryid prove --real log.bag --vessel boat --only wind"
+    assert shown.proof(made) == "ferryid prove --real log.bag --vessel PROFILE.toml --only wind"
+    assert shown.proof_note(made) == ", with the file of the profile boat in the place of PROFILE.toml"
+    assert shown.proof(replace(made, profile="boat")) == "ferryid prove --real log.bag --vessel boat --only wind"
     own = replace(made, path="sea trial/log.bag", profile="boats/vessel.toml")
     assert shown.proof(own) == "ferryid prove --real 'sea trial/log.bag' --vessel boats/vessel.toml --only wind"
+    assert shown.proof_note(own) == ""

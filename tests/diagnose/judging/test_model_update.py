@@ -146,6 +146,7 @@ def model(fouled: str, folder: Path) -> Model:
     found, _ = taught(fouled, "fouling", "wind")
     done = store_updated_model(told(found), FERRY, None, folder / "out")
     assert done[0].model is not None
+    assert done[0].model_accepted
     return load_file(Path(done[0].model))
 
 
@@ -288,6 +289,8 @@ def test_logs_that_agree_are_weighed_and_those_that_do_not_are_told(folder: Path
     assert made.vessel_effects == ()
     assert not made.accepted
     assert "contradict each other about surge (1.8 against 1 -)" in notes[0]
+    done = store_updated_model(told(moved(one, 1.8), moved(two, 1.0)), FERRY, None, folder / "apart")
+    assert (done[0].model is not None, done[0].model_accepted) == (True, False)
     # Logs that differ by more than they admit leave a wider interval than either of them.
     made, notes = update_model(told(moved(one, 1.8), moved(two, 1.72)), FERRY, None, "ferry")
     assert made is not None
