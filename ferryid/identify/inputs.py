@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError, with_sentence
+from ferryid.identify.force_signs import ForceResponse, force_response, unengaged
 from ferryid.identify.motion_data import prepared_data
 from ferryid.identify.settings import FitSettings
 from ferryid.signals.consistency import comparable
@@ -69,7 +70,7 @@ class UsableLogs:
 def usable_logs(
     paths: Sequence[str], profile: Profile, settings: FitSettings, run: RunContext, whole: str = "fit"
 ) -> UsableLogs:
-    """Read several logs as `read_logs` does, without those that a fit cannot use.
+    """Read several logs as `read_logs` does, without those that a fit cannot use and those whose actuators were not engaged.
 
     `whole` is what the others are left out of, as their sentences say.
 
@@ -79,17 +80,30 @@ def usable_logs(
         Where none can be used, for a path that leads nowhere, and for a log that is given twice.
     """
     read, alone = _reader(profile, settings, run), len(paths) == 1
+    responses: dict[str, ForceResponse | None] = {}
 
     def examined(path: str) -> tuple[str, Opened]:
         one = read(path)
         if not alone:
-            # Refuses a log that a fit cannot use, such as one shorter than the smoothing window.
-            prepared_data(profile, settings, [one])
+            responses[path] = _response(one, profile, settings)
         return path, one
 
     errors: dict[str, FerryIdError] = {}
     found = list(usable(paths, examined, errors, lambda made: comparable(made[1].track)))
+    errors |= {path: FerryIdError(f"{path}: {why}") for path, why in unengaged(responses, profile).items()}
     return UsableLogs(_in_time([one for path, one in found if path not in errors]), left_out_of(whole, errors))
+
+
+def _response(one: Opened, profile: Profile, settings: FitSettings) -> ForceResponse | None:
+    """Return how the vessel of a log accelerates under the applied force; None where a fit does not ask, or the log cannot say.
+
+    Raises
+    ------
+    FerryIdError
+        For a log that a fit cannot use, such as one shorter than the smoothing window.
+    """
+    data = prepared_data(profile, settings, [one])
+    return force_response(data) if settings.estimator != "derivative" else None
 
 
 def _reader(profile: Profile, settings: FitSettings, run: RunContext, whole: bool = True) -> Callable[[str], Opened]:

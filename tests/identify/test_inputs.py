@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from ferryid.errors import ContradictionError, FerryIdError
@@ -95,6 +96,13 @@ def sound(seed: int) -> Measured:
     return measured(seed, jitter=0.03, noise=20.0)
 
 
+def adrift(seed: int) -> Measured:
+    """Return a log of a vessel that moves whatever its actuators were ordered."""
+    log = sound(seed)
+    other = np.random.default_rng(seed).standard_normal((len(log.t) // 20 + 1, 3)).repeat(20, axis=0)[: len(log.t)]
+    return replace(log, tau=300.0 * other)
+
+
 def brief() -> Measured:
     return measured(9, seconds=0.5)
 
@@ -146,13 +154,56 @@ def test_too_little_that_is_left_is_refused_with_what_was_left_out(given: Given)
         fit_logs(paths, PROFILE, QUICK, NOWHERE)
 
 
+def test_a_log_whose_actuators_were_not_engaged_is_left_out(given: Given) -> None:
+    paths = given({"one": sound(1), "adrift": adrift(3), "two": sound(2)})
+    found = inputs.usable_logs(paths, PROFILE, QUICK, NOWHERE)
+    assert [one.recording.name for one in found.opened] == ["one", "two"]
+    (why,) = found.left_out
+    assert "adrift.log: the applied forces accelerate the vessel by surge " in why
+    assert "the actuators were not engaged" in why
+    assert "In other logs the vessel follows them. Fix: " in why
+    # The derivative's estimator does not ask.
+    assert not inputs.usable_logs(paths, PROFILE, replace(QUICK, estimator="derivative"), NOWHERE).left_out
+
+
+def test_a_log_that_does_not_show_whether_its_actuators_were_engaged_stays(given: Given) -> None:
+    unknown = replace(adrift(3), tau=adrift(3).tau * [0.0, 0.0, 1.0])
+    short = replace(
+        adrift(4), **{name: getattr(adrift(4), name)[:150] for name in ("t", "eta", "nu", "tau", "usable", "tau_d")}
+    )
+    found = inputs.usable_logs(given({"one": sound(1), "unknown": unknown, "short": short}), PROFILE, QUICK, NOWHERE)
+    assert not found.left_out
+
+
+def test_logs_most_of_which_show_the_same_are_the_profiles_fault(given: Given) -> None:
+    paths = given({"one": sound(1), "adrift": adrift(3), "drifting": adrift(8)})
+    assert not inputs.usable_logs(paths, PROFILE, QUICK, NOWHERE).left_out
+    assert not inputs.usable_logs(paths[1:], PROFILE, QUICK, NOWHERE).left_out
+
+
+def test_a_log_whose_forces_are_reversed_is_not_taken_for_one_without_engaged_actuators(given: Given) -> None:
+    turned = replace(sound(3), tau=-sound(3).tau)
+    assert not inputs.usable_logs(given({"one": sound(1), "turned": turned}), PROFILE, QUICK, NOWHERE).left_out
+
+
 @pytest.mark.slow
 def test_sweeps_leave_out_the_same_logs(given: Given) -> None:
-    paths = given({"one": sound(1), "foreign": None, "two": sound(2)})
+    paths = given({"one": sound(1), "foreign": None, "adrift": adrift(3), "two": sound(2)})
     settings = replace(QUICK, estimator="weak")
     for found in (
         sweep_settings("components", paths, PROFILE, settings, NOWHERE),
         sweep_structures(paths, PROFILE, settings, NOWHERE),
     ):
         assert [log["name"] for log in found.logs] == ["one", "two"]
-        assert [note.split(":")[0] for note in found.notes[-1:]] == ["Left out of the sweep"]
+        assert [note.split(":")[0] for note in found.notes[-2:]] == ["Left out of the sweep"] * 2
+
+
+@pytest.mark.slow
+def test_an_unengaged_run_of_the_catamaran_is_left_out(shared_data: Callable[[str], Path], tmp_path: Path) -> None:
+    logs = sorted(shared_data("vtec_usv").glob("*.bag")) + sorted(shared_data("vtec_usv/edge").glob("*.bag"))
+    profile = load_profile("vtec-usv")
+    found = inputs.usable_logs([str(log) for log in logs], profile, FitSettings().on(profile), RunContext(tmp_path))
+    assert len(found.opened) == len(logs) - 2
+    navigation, engaged = found.left_out
+    assert "u_1_psi_ref_2021-08-16-15-07-44.bag: position is needed" in navigation
+    assert "52000_2016-02-11-10-40-10.bag: the applied forces accelerate the vessel by surge -0.0" in engaged
