@@ -32,6 +32,10 @@ class UnwritableError(FerryIdError):
     """A place that cannot be written, or a full disk: no fault of the input, which may be usable another time."""
 
 
+class ContradictionError(FerryIdError):
+    """A log whose signals contradict each other: something changed in it, or the profile is wrong for all logs."""
+
+
 class ReversedForcesError(FerryIdError):
     """A log in which the vessel accelerates against the applied force: the profile says the opposite of what acts."""
 
@@ -41,6 +45,12 @@ def one_line(message: str) -> str:
     if len(message) > _LONGEST:
         message = f"{message[: _LONGEST // 2]} ... {message[-_LONGEST // 2 :]}"
     return printable(message)
+
+
+def with_sentence(error: FerryIdError, *sentences: str) -> str:
+    """Return the message of an error with more sentences between its cause and its remedy; empty ones are left out."""
+    cause, fix, remedy = str(error).partition(" Fix: ")
+    return " ".join(filter(None, [cause, *sentences])) + fix + remedy
 
 
 def printable(text: str, keep: str = "") -> str:

@@ -52,6 +52,7 @@ from ferryid.regression.resampling import (
 from ferryid.signals.copies import GivenLogs
 from ferryid.signals.prepare import Prepared, prepare
 from ferryid.signals.track import Motion
+from ferryid.signals.usable import left_out_of, usable
 from ferryid.types import AXES, Flags, Floats, Ints, RunContext, by_axis
 from ferryid.vessel.dimensions import window_seconds
 from ferryid.vessel.profile import Profile
@@ -129,6 +130,7 @@ def compare(
     run: RunContext,
     *,
     window_s: float = 1.0,
+    leave_out: bool = True,
 ) -> Comparison:
     """Compare two or more models, and their base model with them.
 
@@ -145,19 +147,26 @@ def compare(
         Output folder and progress.
     window_s
         Smoothing window of the test data [s].
+    leave_out
+        Leave out one of several logs that cannot be used, with a warning; False: refuse it.
 
     Raises
     ------
     FerryIdError
-        For a log given twice, one that cannot be used, one that lacks what a model needs, or has no row that all can be judged
-        on.
+        For a log given twice, and where none can be used: one that lacks what a model needs, or has no row that all can be
+        judged on, is left out of several with a warning.
     """
     check_window(window_s)
     compared: list[ComparedLog] = []
     given = GivenLogs()
-    for path in logs:
+
+    def on(path: str) -> ComparedLog:
         run.progress(f"comparing on {Path(path).name}")
-        compared.append(_compare_log(field, path, run, window_s, given, [log.name for log in compared]))
+        return _compare_log(field, path, run, window_s, given, [log.name for log in compared])
+
+    errors: dict[str, FerryIdError] = {}
+    for log in usable(logs, on, errors) if leave_out else map(on, logs):
+        compared.append(log)
     run.progress("comparing")
     runnable, notes = _models_that_run(field.candidates, compared)
     judged = [_pair_errors(field, [log], runnable) for log in compared]
@@ -169,7 +178,7 @@ def compare(
         window_s=window_s,
         prediction_window_s=window_seconds(field.profile),
         models=tuple(_model(one) for one in field.candidates),
-        warnings=(*field.warnings, *notes),
+        warnings=(*field.warnings, *notes, *left_out_of("comparison", errors)),
         logs=tuple(
             LogErrors(
                 name=log.name,

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ferryid.compare.thresholds import COMPARE
+from ferryid.errors import FerryIdError
 from ferryid.identify import check_window
 from ferryid.models import RANGE_UNITS, ForceScores, Model, StoredEffect, force_scores, outside_ranges, usable_rows
 from ferryid.models.forces import Estimator, effective_mass, without_inputs
@@ -18,6 +19,7 @@ from ferryid.signals.copies import GivenLogs
 from ferryid.signals.prepare import Prepared, prepare
 from ferryid.signals.time_ranges import shares_data
 from ferryid.signals.track import Motion
+from ferryid.signals.usable import left_out_of, usable
 from ferryid.types import Flags, Floats, RunContext
 from ferryid.vessel import parse_profile
 from ferryid.vessel.dimensions import window_seconds
@@ -55,15 +57,15 @@ def evaluate(
     Returns
     -------
     dict
-        Schema ``ferryid.evaluate/1``.
+        Schema ``ferryid.evaluate/1``. Of several logs, those that cannot be used are left out, with a warning.
     """
     profile = signal_map(model, profile)
     check_window(window_s)
     window = float(model.settings["window_s"]) if window_s is None else window_s
     smoother = str(model.settings.get("smoother", "square"))
-    entries, parts, windows, beside_hull = [], [], [], []
     given = GivenLogs()
-    for path in logs:
+
+    def on(path: str) -> _Evaluated:
         run.progress(f"evaluating on {Path(path).name}")
         prepared = prepare(
             path,
@@ -76,44 +78,15 @@ def evaluate(
             ranges=run.ranges,
         )
         given.add(prepared.recording)
-        motion = prepared.motion
-        old = predict_base(model, prepared, profile, window_s=window, smoother=smoother)
-        # A model that adds nothing is its base model: the free run takes longer than all else and is not done twice.
-        new = old if model.blank else predict(model, prepared, profile, window_s=window, smoother=smoother)
-        tau_base, tau_model = old.tau, new.tau
-        rows = usable_rows(motion, tau_model)
-        old_run = old.free_run(rows)
-        new_run = old_run if new is old else new.free_run(rows)
-        parts.append((motion.tau[rows], tau_base[rows], tau_model[rows]))
-        windows.append(_in_windows(model, old, new, motion, rows, profile))
-        unscaled = _beside_unscaled(model, prepared, new, rows, profile)
-        if unscaled is not None:
-            beside_hull.append(unscaled)
-        entries.append(
-            {
-                "name": motion.log,
-                "sha256": prepared.recording.sha256,
-                "rows": int(rows.sum()),
-                "seconds": float(rows.sum() / motion.rate_hz),
-                **_scores(force_scores(motion.tau, tau_base, tau_model, rows), profile).to_json(),
-                "prediction": _prediction_json(windows[-1:], model, profile),
-                **_beside_hull_json(beside_hull[-1:], model, profile),
-                "free_run": {
-                    "base": old_run.to_json(),
-                    "model": new_run.to_json(),
-                },
-                **({"effects": _list_effects(new, prepared.recording.sha256)} if model.diagnosed else {}),
-                "outside": outside_ranges(model.ranges, motion, rows),
-                "warnings": [
-                    *prepared.doubts,
-                    *_warnings(prepared.recording.sha256, model, motion, rows),
-                    *prepared.left_out,
-                ],
-                "data_quality": prepared.quality,
-            }
-        )
+        return _evaluated(model, prepared, profile, window, smoother)
+
+    errors: dict[str, FerryIdError] = {}
+    found = list(usable(logs, on, errors))
+    windows = [one.windows for one in found]
+    beside_hull = [one.beside_hull for one in found if one.beside_hull is not None]
+    left_out = left_out_of("evaluation", errors)
     run.progress("")
-    tau, base_all, model_all = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+    tau, base_all, model_all = (np.concatenate(columns) for columns in zip(*(one.forces for one in found), strict=True))
     return {
         "schema": "ferryid.evaluate/1",
         "model": {
@@ -124,13 +97,72 @@ def evaluate(
             **({"base": _base_of(model)} if model.diagnosed else {}),
         },
         "window_s": window,
-        "logs": entries,
+        "logs": [one.entry for one in found],
         "pooled": {
             **_scores(force_scores(tau, base_all, model_all, np.ones(len(tau), dtype=bool)), profile).to_json(),
             "prediction": _prediction_json(windows, model, profile),
             **_beside_hull_json(beside_hull, model, profile),
         },
+        **({"warnings": list(left_out)} if left_out else {}),
     }
+
+
+@dataclass(frozen=True, eq=False)
+class _Evaluated:
+    """What one log says of a model.
+
+    Attributes
+    ----------
+    entry
+        Of the log, in the result.
+    forces
+        Measured force, the base model's and the model's on its usable rows [N, N, N·m], shape (n, 3) each.
+    windows
+        What `_in_windows` returns.
+    beside_hull
+        What `_beside_unscaled` returns.
+    """
+
+    entry: dict[str, Any]
+    forces: tuple[Floats, Floats, Floats]
+    windows: _Windows
+    beside_hull: _Windows | None
+
+
+def _evaluated(model: Model, prepared: Prepared, profile: Profile, window_s: float, smoother: str) -> _Evaluated:
+    """Judge a model on one log that was read."""
+    motion = prepared.motion
+    old = predict_base(model, prepared, profile, window_s=window_s, smoother=smoother)
+    # A model that adds nothing is its base model: the free run takes longer than all else and is not done twice.
+    new = old if model.blank else predict(model, prepared, profile, window_s=window_s, smoother=smoother)
+    tau_base, tau_model = old.tau, new.tau
+    rows = usable_rows(motion, tau_model)
+    old_run = old.free_run(rows)
+    new_run = old_run if new is old else new.free_run(rows)
+    windows = _in_windows(model, old, new, motion, rows, profile)
+    unscaled = _beside_unscaled(model, prepared, new, rows, profile)
+    entry = {
+        "name": motion.log,
+        "sha256": prepared.recording.sha256,
+        "rows": int(rows.sum()),
+        "seconds": float(rows.sum() / motion.rate_hz),
+        **_scores(force_scores(motion.tau, tau_base, tau_model, rows), profile).to_json(),
+        "prediction": _prediction_json([windows], model, profile),
+        **_beside_hull_json([] if unscaled is None else [unscaled], model, profile),
+        "free_run": {
+            "base": old_run.to_json(),
+            "model": new_run.to_json(),
+        },
+        **({"effects": _list_effects(new, prepared.recording.sha256)} if model.diagnosed else {}),
+        "outside": outside_ranges(model.ranges, motion, rows),
+        "warnings": [
+            *prepared.doubts,
+            *_warnings(prepared.recording.sha256, model, motion, rows),
+            *prepared.left_out,
+        ],
+        "data_quality": prepared.quality,
+    }
+    return _Evaluated(entry, (motion.tau[rows], tau_base[rows], tau_model[rows]), windows, unscaled)
 
 
 def _in_windows(

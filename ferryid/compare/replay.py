@@ -97,7 +97,8 @@ def replay_versions(
         As `compare`.
     """
     field = select_candidates((new.label, old.label), (new, old), vessel)
-    result = compare(field, logs, run).result
+    # Which version is current is not decided on fewer logs than were named.
+    result = compare(field, logs, run, leave_out=False).result
     scope: CommonErrors = result.pooled if result.pooled is not None else result.logs[0]
     pair = _pair(scope.pairs, new.label, old.label)
     known = tuple({"name": log.name, "sha256": log.sha256} for log in result.logs)

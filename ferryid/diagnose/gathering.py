@@ -23,6 +23,7 @@ from ferryid.models import Model
 from ferryid.side_by_side import over
 from ferryid.signals.artificial import NO_RECORDING
 from ferryid.signals.order_of_time import dated
+from ferryid.signals.usable import left_out_of, tried
 from ferryid.types import RunContext
 from ferryid.vessel.profile import Profile
 
@@ -76,26 +77,18 @@ def gather(
         Where none can be used, and for a path that leads nowhere.
     """
 
-    def screened(path: str) -> AveragedLog | FerryIdError:
-        try:
-            return average(screen_sensors(measure_log(path, profile, run, withhold=withhold), run.progress))
-        except FerryIdError as error:
-            # A path that leads nowhere is a slip of the pen, no log that cannot be used.
-            if not leads_somewhere(path):
-                raise
-            return error
+    def screened(path: str) -> AveragedLog:
+        measured = measure_log(path, profile, run, withhold=withhold)
+        return average(screen_sensors(measured, run.progress))
 
     given, paths = list(paths), list({_resolved(path): path for path in reversed(paths)}.values())[::-1]
-    made = over(screened, paths)
+    made = over(lambda path: tried(screened, path), paths)
     found = [one for one in made if isinstance(one, AveragedLog)]
     errors = {path: one for path, one in zip(paths, made, strict=True) if isinstance(one, FerryIdError)}
     if not found:
         raise next(iter(errors.values()))
     whose = "references" if references else "campaign"
-    notes = [
-        f"Left out of the {whose}: {error if Path(path).stem in str(error) else f'{path}: {error}'}"
-        for path, error in errors.items()
-    ]
+    notes = [*left_out_of(whose, errors)]
     notes += [
         f"Given twice: {path}: it counts once"
         for path in dict.fromkeys(given)
@@ -120,11 +113,6 @@ def _copied(path: str, other: str, whose: str) -> str:
         f"Left out of the {whose}: {path}: it holds the motion of {Path(other).name}, as the same recording does under another "
         "name or in another format: it is no further evidence, and no estimate has it twice"
     )
-
-
-def leads_somewhere(path: str) -> bool:
-    """Return whether the path of a log, or those of all of its parts joined by ``+``, exist."""
-    return Path(path).exists() or all(Path(part).exists() for part in path.split("+"))
 
 
 def with_common_sensors(logs: Sequence[AveragedLog]) -> tuple[AveragedLog, ...]:

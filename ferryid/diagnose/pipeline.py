@@ -11,7 +11,6 @@ from ferryid.diagnose.gathering import (
     Gathered,
     Group,
     gather,
-    leads_somewhere,
     part,
     with_common_sensors,
     without_logs,
@@ -35,6 +34,7 @@ from ferryid.freed import give_back
 from ferryid.models import Model
 from ferryid.models.store import check_name
 from ferryid.side_by_side import over
+from ferryid.signals.usable import usable
 from ferryid.types import RunContext
 from ferryid.vessel.profile import SETTINGS, Profile
 
@@ -234,18 +234,13 @@ def diagnose(
         return distinguished(diagnose_campaign(logs, profile, settings, run))
     profile = settings.recorded(profile)
     references = _references(logs, profile, settings, run)
-    found, errors = list[Diagnosis](), list[FerryIdError]()
-    for log in logs:
-        try:
-            found += _diagnosed(_groups([log], references, profile, settings, run), profile, settings, run)
-        except FerryIdError as error:
-            # A path that leads nowhere is a slip of the pen, no log that cannot be used.
-            if not leads_somewhere(log):
-                raise
-            errors.append(error)
-    if not found:
-        raise errors[0]
-    notes = tuple(f"Not diagnosed: {error}" for error in errors)
+
+    def by_itself(log: str) -> tuple[Diagnosis, ...]:
+        return _diagnosed(_groups([log], references, profile, settings, run), profile, settings, run)
+
+    errors: dict[str, FerryIdError] = {}
+    found = [one for several in usable(logs, by_itself, errors) for one in several]
+    notes = tuple(f"Not diagnosed: {error}" for error in errors.values())
     return distinguished(
         [replace(one, latest=True, notes=(*notes, *one.notes), gathered=(*notes, *one.gathered)) for one in found]
     )

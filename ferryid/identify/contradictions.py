@@ -85,7 +85,9 @@ def signs_of(profile: Profile) -> tuple[list[str], int, list[tuple[str, str]]]:
     return angles, len(profile.actuators), pairs
 
 
-def wrong_size(response: Floats, spread: Floats, share: Floats, profile: str) -> str:
+def wrong_size(
+    response: Floats, spread: Floats, share: Floats, profile: str, sigmas: Floats | float = IDENTIFY.wrong_way_sigmas
+) -> str:
     """Return what is wrong and how to mend it where the applied force is many times too large or too small; empty where not.
 
     It is where the inertia that it means is impossible on every axis on which it is estimated, and on two of them at least by
@@ -97,11 +99,13 @@ def wrong_size(response: Floats, spread: Floats, share: Floats, profile: str) ->
         As of `wrong_way`.
     share
         The base model's inertia over the rigid body's on each axis, shape (3,).
+    sigmas
+        Standard deviations beyond which a response is no chance, shape (3,) or one for all.
     """
     known = np.isfinite(response)
-    reach = IDENTIFY.wrong_way_sigmas * spread[known]
-    low, high = share[known] / IDENTIFY.most_inertia, share[known] / IDENTIFY.least_inertia
-    large = bool(np.all(response[known] < low)) and np.count_nonzero(response[known] + reach < low) >= 2
+    reach = (sigmas * spread)[known]
+    high = share[known] / IDENTIFY.least_inertia
+    large = unanswered(response, sigmas * spread, share)
     small = bool(np.all(response[known] > high)) and np.count_nonzero(response[known] - reach > high) >= 2
     if not (large or small):
         return ""
@@ -115,6 +119,22 @@ def wrong_size(response: Floats, spread: Floats, share: Floats, profile: str) ->
         "correct the unit of the actuators' signals (1 rad/s is 9.55 rpm, 1 kgf 9.81 N), the thrust curve or mass_kg"
     )
     return f"{told}{cause}. Fix: in {profile}, {remedy}"
+
+
+def unanswered(response: Floats, reach: Floats, share: Floats) -> bool:
+    """Return whether the vessel hardly follows the applied force on any axis, on two at least by more than chance.
+
+    Parameters
+    ----------
+    response, share
+        As of `wrong_size`.
+    reach
+        How far a response is from the truth by chance, shape (3,).
+    """
+    known = np.isfinite(response)
+    least = share[known] / IDENTIFY.most_inertia
+    surely = np.count_nonzero(response[known] + reach[known] < least)
+    return bool(np.all(response[known] < least)) and bool(surely >= 2)
 
 
 def faint_force(force: Floats, needed: Floats, profile: str) -> str:

@@ -6,12 +6,13 @@ a window is averaged away, and with it what shows that its thrusters are exchang
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ferryid.errors import ReversedForcesError
-from ferryid.identify.contradictions import signs_of, wrong_way
+from ferryid.identify.contradictions import signs_of, unanswered, wrong_size, wrong_way
 from ferryid.identify.inertia import relative_inertia, without_inertia
 from ferryid.identify.motion_data import LogData
 from ferryid.identify.split import Split
@@ -39,18 +40,33 @@ class ForceResponse:
     possible
         Whether an inertia that a hull can have explains the response but for its sign, by the windows alone, shape (3,). It
         does not where a controller's answer to the motion is taken for its cause, or the unit of the force is wrong.
+    share
+        The base model's inertia over the rigid body's, shape (3,).
     """
 
     response: Floats
     spread: Floats
     sigmas: Floats
     possible: Flags
+    share: Floats
 
     @property
     def reversed(self) -> Floats:
         """The response on axes on which it goes against the force by as much as a reversed sign gives, NaN elsewhere, (3,)."""
         against = (self.response < -IDENTIFY.opposite) & (self.response < -self.sigmas * self.spread)
         return np.where(against & self.possible, self.response, np.nan)
+
+    @property
+    def unanswered(self) -> bool:
+        """Whether the vessel hardly follows the applied force on any axis, nor goes against it: no actuator was engaged."""
+        against = np.isfinite(self.reversed).any()
+        return not against and unanswered(self.response, self.sigmas * self.spread, self.share)
+
+    @property
+    def answered(self) -> bool:
+        """Whether the vessel follows the applied force on an axis by more than chance, as far as an inertia lets it."""
+        least = self.share / IDENTIFY.most_inertia
+        return bool(np.any(self.response - self.sigmas * self.spread > least))
 
 
 def force_response(data: LogData) -> ForceResponse | None:
@@ -83,7 +99,8 @@ def _estimated(weak: WeakData) -> ForceResponse:
     windows = sum(len(one) for one in weak.windows.training)
     response, spread, sigmas = np.full(3, np.nan), np.full(3, np.nan), np.full(3, np.nan)
     possible = np.zeros(3, dtype=bool)
-    largest = relative_inertia(weak.profile, weak.windows.base_mass) / IDENTIFY.least_inertia
+    share = relative_inertia(weak.profile, weak.windows.base_mass)
+    largest = share / IDENTIFY.least_inertia
     for axis, name in enumerate(ACCELERATIONS):
         own, place = np.flatnonzero(mask[:, axis]), terms.index(name)
         if place not in own:
@@ -95,7 +112,7 @@ def _estimated(weak: WeakData) -> ForceResponse:
         prior[at] = 0.0
         alone, error, free = _response(weak, axis, own, at, prior, windows)
         possible[axis] = bool(alone + float(stdtrit(free, level)) * error > -largest[axis])
-    return ForceResponse(response, spread, sigmas, possible)
+    return ForceResponse(response, spread, sigmas, possible, share)
 
 
 def _response(weak: WeakData, axis: int, own: Ints, at: int, prior: Floats, windows: int) -> tuple[float, float, float]:
@@ -165,3 +182,30 @@ def _undecided(found: ForceResponse, profile: Profile) -> str:
         f"These logs do not show whether the yaw moment acts the right way round: the vessel follows it by {value:.2g} ± "
         f"{spread:.2g} of what the base model expects, and {' or '.join(causes)} would look alike. Record turns to both sides."
     )
+
+
+def unengaged(responses: Mapping[str, ForceResponse | None], profile: Profile) -> dict[str, str]:
+    """Return, of several logs, those in which the actuators were not engaged, and a sentence on each, with its remedy.
+
+    None where more logs show that the vessel does not follow the applied force than show that it does: the profile is wrong
+    then, and what a fit to all of them is refused for says where.
+
+    Parameters
+    ----------
+    responses
+        How the vessel accelerates in each log, by the log's path; None where that is not known.
+    profile
+        The vessel.
+    """
+    known = {path: one for path, one in responses.items() if one is not None}
+    without = {path: one for path, one in known.items() if one.unanswered}
+    if len(without) > sum(one.answered for one in known.values()):
+        return {}
+    found = {}
+    for path, one in without.items():
+        told = wrong_size(one.response, one.spread, one.share, profile.name, one.sigmas).partition(". Fix: ")[0]
+        found[path] = (
+            f"{told}. In other logs the vessel follows them. Fix: see whether the actuators were engaged in this log, or "
+            "give it a profile of its own"
+        )
+    return found

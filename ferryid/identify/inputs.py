@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+from ferryid.counts import counted
+from ferryid.errors import FerryIdError, with_sentence
+from ferryid.identify.force_signs import ForceResponse, force_response, unengaged
+from ferryid.identify.motion_data import prepared_data
 from ferryid.identify.settings import FitSettings
+from ferryid.signals.consistency import comparable
 from ferryid.signals.copies import GivenLogs
 from ferryid.signals.order_of_time import in_order
 from ferryid.signals.prepare import Opened, open_track
 from ferryid.signals.stream import compact
+from ferryid.signals.usable import left_out_of, usable
 from ferryid.types import RunContext
 from ferryid.vessel.profile import Profile
 
@@ -31,10 +37,87 @@ def read_logs(
     FerryIdError
         For a log that cannot be used, and one that is given twice.
     """
-    opened, given = [], GivenLogs()
-    for path in paths:
+    read = _reader(profile, settings, run, whole)
+    return _in_time([read(path) for path in paths])
+
+
+@dataclass(frozen=True, eq=False)
+class UsableLogs:
+    """Logs that a fit can use, read and aligned, in order of time.
+
+    Attributes
+    ----------
+    opened
+        The logs.
+    left_out
+        Why each of the others is left out, as sentences.
+    """
+
+    opened: list[Opened]
+    left_out: tuple[str, ...] = ()
+
+    def beside(self, error: FerryIdError) -> str:
+        """Return the message of what a fit of these logs was refused for, and that it was without the others."""
+        if not self.left_out:
+            return str(error)
+        first = self.left_out[0].partition(" Fix: ")[0]
+        more = len(self.left_out) - 1
+        return with_sentence(
+            error, first, f"So {'is' if more == 1 else 'are'} {counted(more, 'more log')}." * bool(more)
+        )
+
+
+def usable_logs(
+    paths: Sequence[str], profile: Profile, settings: FitSettings, run: RunContext, whole: str = "fit"
+) -> UsableLogs:
+    """Read several logs as `read_logs` does, without those that a fit cannot use and those whose actuators were not engaged.
+
+    `whole` is what the others are left out of, as their sentences say.
+
+    Raises
+    ------
+    FerryIdError
+        Where none can be used, for a path that leads nowhere, and for a log that is given twice.
+    """
+    read, alone = _reader(profile, settings, run), len(paths) == 1
+    responses: dict[str, ForceResponse | None] = {}
+
+    def examined(path: str) -> tuple[str, Opened]:
+        one = read(path)
+        if not alone:
+            responses[path] = _response(one, profile, settings)
+        return path, one
+
+    errors: dict[str, FerryIdError] = {}
+    found = list(usable(paths, examined, errors, lambda made: comparable(made[1].track)))
+    errors |= {path: FerryIdError(f"{path}: {why}") for path, why in unengaged(responses, profile).items()}
+    return UsableLogs(_in_time([one for path, one in found if path not in errors]), left_out_of(whole, errors))
+
+
+def _response(one: Opened, profile: Profile, settings: FitSettings) -> ForceResponse | None:
+    """Return how the vessel of a log accelerates under the applied force; None where a fit does not ask, or the log cannot say.
+
+    Raises
+    ------
+    FerryIdError
+        For a log that a fit cannot use, such as one shorter than the smoothing window.
+    """
+    data = prepared_data(profile, settings, [one])
+    return force_response(data) if settings.estimator != "derivative" else None
+
+
+def _reader(profile: Profile, settings: FitSettings, run: RunContext, whole: bool = True) -> Callable[[str], Opened]:
+    """Return what reads and aligns a log that was not given before."""
+    given = GivenLogs()
+
+    def read(path: str) -> Opened:
         run.progress(f"reading {Path(path).name}")
         one = open_track(path, profile, run.tables, rate_hz=settings.rate_hz, verify=run.verify, ranges=run.ranges)
         given.add(one.recording)
-        opened.append(one if whole else replace(one, recording=compact(one.recording)))
+        return one if whole else replace(one, recording=compact(one.recording))
+
+    return read
+
+
+def _in_time(opened: Sequence[Opened]) -> list[Opened]:
     return [opened[i] for i in in_order([one.recording.start_ns for one in opened])]

@@ -12,7 +12,7 @@ import numpy as np
 from ferryid.cached import cached_property
 from ferryid.identify.averaged_out import averaged_out
 from ferryid.identify.contradictions import faint_force
-from ferryid.identify.excitation import assess_excitation, still_warnings
+from ferryid.identify.excitation import assess_excitation, still_axes, still_warnings
 from ferryid.identify.fit_data import Coefficients, Estimate, FitData
 from ferryid.identify.fit_warnings import fit_warnings
 from ferryid.identify.inertia import axes_without_force
@@ -29,7 +29,7 @@ from ferryid.models.forces import Estimator, compute_residual, without_inputs
 from ferryid.models.prediction import FreeRun, run_free
 from ferryid.regression import CrossProducts, QrFactor, Rows, factorise
 from ferryid.regression.resampling import Blocks, block_seconds
-from ferryid.signals.prepare import Prepared
+from ferryid.signals.prepare import Opened, Prepared, smoothed
 from ferryid.signals.track import Motion, segments
 from ferryid.types import Flags, Floats
 from ferryid.vessel.dimensions import window_seconds
@@ -255,6 +255,19 @@ class LogData(MotionData):
             *averaged_out(self.profile, self.motions),
             *fit_warnings(self.settings, self.split, excitation, self.prepared, self.motions, scores),
         )
+
+
+def prepared_data(
+    profile: Profile,
+    settings: FitSettings,
+    opened: Sequence[Opened],
+    progress: Callable[[str], None] = lambda said: None,
+) -> LogData:
+    """Return aligned logs smoothed, with residuals and without axes that do not move; errors of `compute_residuals`."""
+    prepared = [smoothed(one, settings.window_s, settings.smoother) for one in opened]
+    progress("computing the residual")
+    data = compute_residuals(profile, settings, prepared)
+    return replace(data, functions=data.functions.without(still_axes(profile, data.motions)))
 
 
 def compute_residuals(

@@ -13,20 +13,20 @@ from datetime import UTC, datetime
 import numpy as np
 
 from ferryid import __version__
+from ferryid.errors import FerryIdError, with_sentence
 from ferryid.identify.acceptance import NOT_JUDGED, Acceptance, accept
 from ferryid.identify.beside_profile import beside_profile
 from ferryid.identify.estimation import estimate_correction
 from ferryid.identify.estimators import choose_estimator
-from ferryid.identify.excitation import still_axes
 from ferryid.identify.fit_data import Coefficients, Estimate, FitData
 from ferryid.identify.fit_warnings import free_run_warnings, rest_warnings, unused_window
 from ferryid.identify.force_signs import refuse_reversed_forces
 from ferryid.identify.free_run_checks import free_run_checks
 from ferryid.identify.held_out_checks import held_out_checks, skill_checks
-from ferryid.identify.inputs import read_logs
+from ferryid.identify.inputs import usable_logs
 from ferryid.identify.log_sums import folds_by_blocks, force_free_axes, sum_log
 from ferryid.identify.model_selection import Selection, select_model, windows_to_try
-from ferryid.identify.motion_data import LogData, compute_residuals, numbered_names
+from ferryid.identify.motion_data import LogData, numbered_names, prepared_data
 from ferryid.identify.outcome import ComponentCurve, EstimatorScore, Excitation, FitOutcome
 from ferryid.identify.own_conditions import with_own_conditions
 from ferryid.identify.physical_checks import law_of, physical_checks
@@ -41,7 +41,7 @@ from ferryid.models import Model, ModelScores
 from ferryid.models.store import check_name
 from ferryid.regression.bases import Basis
 from ferryid.signals.artificial import NO_RECORDING
-from ferryid.signals.prepare import Opened, smoothed
+from ferryid.signals.prepare import Opened
 from ferryid.signals.smooth import smooth_measured
 from ferryid.types import Flags, RunContext
 from ferryid.vessel.profile import Profile
@@ -68,10 +68,17 @@ def fit_logs(
     Raises
     ------
     FerryIdError
-        For input that cannot be used, with file, cause and remedy.
+        For input that cannot be used, with file, cause and remedy. One of several logs is left out instead, with a warning.
     """
     name, settings = check_name(name or profile.name), settings.on(profile)
-    return fit_opened(read_logs(paths, profile, settings, run), profile, settings, run, name)
+    logs = usable_logs(paths, profile, settings, run)
+    try:
+        outcome = fit_opened(logs.opened, profile, settings, run, name)
+    except FerryIdError as error:
+        if not logs.left_out:
+            raise
+        raise type(error)(logs.beside(error)) from error
+    return replace(outcome, warnings=(*outcome.warnings, *logs.left_out))
 
 
 def fit_opened(
@@ -133,7 +140,7 @@ def estimator_for(opened: Sequence[Opened], profile: Profile, settings: FitSetti
     if settings.windows_s:
         run.progress("choosing the window")
         settings, parts = _select_window(profile, settings, opened)
-    data = _prepare(opened, profile, settings, run)
+    data = prepared_data(profile, settings, opened, run.progress)
     undecided = refuse_reversed_forces(data) if settings.estimator != "derivative" else ""
     if parts is None:
         parts = _split(data, undecided)
@@ -143,21 +150,12 @@ def estimator_for(opened: Sequence[Opened], profile: Profile, settings: FitSetti
     return replace(chosen, notes=(undecided,) if undecided else ())
 
 
-def _prepare(opened: Sequence[Opened], profile: Profile, settings: FitSettings, run: RunContext) -> LogData:
-    """Return smoothed logs with their residuals; no row trains or validates yet."""
-    prepared = [smoothed(one, settings.window_s, settings.smoother) for one in opened]
-    run.progress("computing the residual")
-    data = compute_residuals(profile, settings, prepared)
-    return replace(data, functions=data.functions.without(still_axes(profile, data.motions)))
-
-
 def _split(data: LogData, undecided: str) -> Split:
     """Return which rows train and validate; a refusal of logs that are too short says what else they leave undecided."""
     try:
         return split_rows(data.motions, data.settings.split, window_s=data.settings.window_s)
     except TooShort as error:
-        cause, fix, remedy = str(error).partition(" Fix: ")
-        raise TooShort(" ".join(filter(None, [cause, undecided])) + fix + remedy) from error
+        raise TooShort(with_sentence(error, undecided)) from error
 
 
 def _choose_data(data: LogData, training: Sequence[Flags], opened: Sequence[Opened], run: RunContext) -> ChosenData:

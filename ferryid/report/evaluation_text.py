@@ -53,6 +53,8 @@ def render_evaluation(result: dict[str, Any]) -> str:
         lines.extend(f"  {told}" for told in applied["left_out"])
         lines.extend(f"  warning: {warning}" for warning in entry.get("warnings", ()))
     pooled = result.get("pooled", {}).get("prediction", {})
+    if result.get("warnings"):
+        lines += ["", *(f"warning: {warning}" for warning in result["warnings"])]
     if pooled.get("windows"):
         lines += ["", *_explained(pooled["window_s"], "base" in head)]
     return "\n".join(lines)

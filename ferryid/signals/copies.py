@@ -28,6 +28,10 @@ COMPARED = (("x", "y"), ("u", "v"), ("psi",))
 """Signals of one topic that are compared: the first of them that both logs have and that changes."""
 
 
+class GivenTwiceError(FerryIdError):
+    """A recording that a command was given twice: a fault of the arguments, whatever the log holds."""
+
+
 class GivenLogs:
     """The logs that a command was given so far, none of them twice."""
 
@@ -40,7 +44,7 @@ class GivenLogs:
 
         Raises
         ------
-        FerryIdError
+        GivenTwiceError
             For one that was given before: with the same content, as a copy in another format or a piece, or with a file of its
             own that is part of both.
         """
@@ -48,15 +52,15 @@ class GivenLogs:
         for other, sha256, known in self._known:
             if recording.sha256 == sha256:
                 what = "given twice, and" if name == other else f"the same log as {other}, which"
-                raise FerryIdError(f"{name}: {what} would count twice. Fix: give it once")
+                raise GivenTwiceError(f"{name}: {what} would count twice. Fix: give it once")
             if samples.same(known):
-                raise FerryIdError(
+                raise GivenTwiceError(
                     f"{name}: holds the recording of {other}, or a piece of it, which would count twice. "
                     "Fix: give one of the two"
                 )
         files = {str(Path(file).resolve()) for file in recording.files}
         if shared := sorted(files & self._files):
-            raise FerryIdError(f"{shared[0]}: is part of two logs, so that it would count twice. Fix: give it once")
+            raise GivenTwiceError(f"{shared[0]}: is part of two logs, so that it would count twice. Fix: give it once")
         self._known.append((name, recording.sha256, samples))
         self._files |= files
 

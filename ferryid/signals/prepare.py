@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.cached import cached_property
-from ferryid.errors import FerryIdError
+from ferryid.errors import ContradictionError
 from ferryid.signals.align import align
 from ferryid.signals.artificial import NO_RECORDING, artificial
 from ferryid.signals.data_quality import left_out_sentences
@@ -126,7 +126,7 @@ def track_of(
     track = align(recording, profile, rate_hz, faults)
     for doubt in track.doubts:
         if doubt.certain:
-            raise FerryIdError(
+            raise ContradictionError(
                 f"{recording.name}: signals contradict each other, so they cannot be used. {doubt.says} "
                 f"Fix: in the profile {profile.name}, {doubt.remedy}"
             )

@@ -166,7 +166,7 @@ def _line(profile: Profile, why: str) -> str:
 def _fitting(logs: Sequence[str]) -> VesselChoice:
     """Return the one profile whose signals all logs have, or most of them where no profile fits the others.
 
-    What becomes of the others is for the command to say: a diagnosis leaves them out, a fit refuses them with what they lack.
+    What becomes of the others is for the command to say: most leave them out with what they lack.
 
     Raises
     ------

@@ -177,3 +177,21 @@ def test_a_load_aboard_in_all_logs_is_no_weak_thruster(ferryid: Command, tmp_pat
     model = json.loads(Path(made["model"]).read_text("utf-8"))
     assert all("payload" in {effect["effect"] for effect in one["effects"]} for one in model["conditions"])
     assert result(ferryid("evaluate", made["model"], logs[0], "--out", tmp_path, "--json", "-"))["logs"]
+
+
+def test_a_fit_of_several_logs_names_the_one_that_it_leaves_out(
+    ferryid: Command, bags: list[Path], tmp_path: Path
+) -> None:
+    foreign = tmp_path / "foreign.csv"
+    foreign.write_text("time,temperature\n0,1\n1,2\n2,3\n", encoding="utf-8")
+    run = ferryid("fit", *bags[:2], foreign, *VESSEL, "--out", tmp_path)
+    assert run.code == 0, run.err
+    assert "warning: Left out of the fit: " in run.out
+    page = (tmp_path / "reports" / "milliampere-v1" / "report.html").read_text("utf-8")
+    assert "Left out of the fit: " in page
+    made = result(ferryid("evaluate", "milliampere@1", bags[2], foreign, "--out", tmp_path, "--json", "-"))
+    conforms(json.dumps(made))
+    assert "foreign.csv" in made["warnings"][0]
+    run = ferryid("fit", *bags[:2], tmp_path / "nowhere.mcap", *VESSEL, "--out", tmp_path)
+    assert run.code == 2
+    assert "nowhere.mcap: no such file" in run.err

@@ -12,6 +12,7 @@ import pytest
 from ferryid.compare.candidates import BASE, CandidateSet, select_candidates
 from ferryid.compare.comparison import Comparison, compare
 from ferryid.compare.comparison_result import ComparisonResult
+from ferryid.compare.replay import replay_versions
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json
 from ferryid.models.model import Model, blank_model
@@ -275,6 +276,24 @@ def test_a_log_is_given_once(field: CandidateSet, folder: Path) -> None:
     log = logs_in(folder)[0]
     with pytest.raises(FerryIdError, match=r"trial-0\.mcap: given twice, and would count twice\. Fix: "):
         compare(field, [log, log], RunContext(folder / "out"))
+
+
+def test_one_of_several_logs_that_cannot_be_used_is_left_out(field: CandidateSet, folder: Path, tmp_path: Path) -> None:
+    foreign = tmp_path / "foreign.csv"
+    foreign.write_text("time,temperature\n0,1\n1,2\n2,3\n", encoding="utf-8")
+    log, run = logs_in(folder)[1], RunContext(tmp_path / "out")
+    found = compare(field, [str(foreign), log], run).result
+    assert [one.name for one in found.logs] == ["trial-1"]
+    (warning,) = found.warnings
+    assert warning.startswith("Left out of the comparison: ")
+    assert "foreign.csv: " in warning
+    assert "Fix: " in warning
+    for logs in ([str(foreign)], [str(tmp_path / "absent.csv"), log]):
+        with pytest.raises(FerryIdError, match=r"foreign\.csv: |absent\.csv: no such file"):
+            compare(field, logs, run)
+    # What decides on the current version is told of every log that was named.
+    with pytest.raises(FerryIdError, match=r"foreign\.csv: "):
+        replay_versions(heavier(1, 1.1), heavier(2, 3.0), [log, str(foreign)], run)
 
 
 def test_a_model_that_cannot_be_run_free_is_left_out_of_free_runs_alone(folder: Path) -> None:

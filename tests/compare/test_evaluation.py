@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
+from importlib.resources import files
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
 
@@ -75,6 +78,24 @@ def test_the_verdict_says_where_a_model_is_worse(ratios: tuple[float, float, flo
 def shown(told: str, part: str) -> list[str]:
     """Return the lines of a text that contain a part."""
     return [line for line in told.splitlines() if part in line]
+
+
+def test_one_of_several_logs_that_cannot_be_used_is_left_out(tmp_path: Path) -> None:
+    foreign = tmp_path / "foreign.csv"
+    foreign.write_text("time,temperature\n0,1\n1,2\n2,3\n", encoding="utf-8")
+    model, run = blank_model(load_profile("milliampere"), "ferry"), RunContext(tmp_path / "out")
+    told = evaluate(model, [str(foreign), str(LOG)], run)
+    assert [one["name"] for one in told["logs"]] == ["short"]
+    (warning,) = told["warnings"]
+    assert warning.startswith("Left out of the evaluation: ")
+    assert "foreign.csv: " in warning
+    assert f"warning: {warning}" in render_evaluation(told).splitlines()
+    schema = json.loads(files("ferryid.schemas").joinpath("evaluate.json").read_text(encoding="utf-8"))
+    jsonschema.validate(json.loads(dump_json(told)), schema)
+    assert "warnings" not in evaluate(model, [str(LOG)], run)
+    for logs in ([str(foreign)], [str(tmp_path / "absent.csv"), str(LOG)]):
+        with pytest.raises(FerryIdError, match=r"foreign\.csv: |absent\.csv: no such file"):
+            evaluate(model, logs, run)
 
 
 @pytest.fixture(scope="module")

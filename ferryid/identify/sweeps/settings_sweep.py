@@ -11,7 +11,7 @@ from ferryid.counts import counted
 from ferryid.effects.wording import listed
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.identify.archive import archive_folds
-from ferryid.identify.inputs import read_logs
+from ferryid.identify.inputs import UsableLogs, usable_logs
 from ferryid.identify.log_sums import folds_by_blocks, folds_by_logs, force_free_axes, sum_log
 from ferryid.identify.model_selection import Selection, select_model, windows_to_try
 from ferryid.identify.outcome import EstimatorScore
@@ -136,7 +136,7 @@ def sweep_settings(
     Raises
     ------
     FerryIdError
-        For input that cannot be used, with file, cause and remedy.
+        For input that cannot be used, with file, cause and remedy. One of several logs is left out instead, with a note.
     """
     if what not in KINDS:
         raise FerryIdError(
@@ -150,7 +150,8 @@ def sweep_settings(
     asked, settings = settings.estimator, replace(settings, windows_s=()).on(profile)
     if what != "window":
         settings = replace(settings, components="auto")
-    opened = () if archive else tuple(read_logs(logs, profile, settings, run))
+    given = UsableLogs([]) if archive else usable_logs(logs, profile, settings, run, "sweep")
+    opened = tuple(given.opened)
     request = _Request(what, tuple(logs), opened, profile, settings, run, tuple(windows_s), folds, archive)
     kind, says, scores = _as_a_fit(request)
     if kind == "weak":
@@ -163,7 +164,8 @@ def sweep_settings(
             found = _sweep_derivative(request.of("derivative"))
     else:
         found = _sweep_derivative(request.of("derivative"))
-    return replace(found, asked=asked, estimator_says=says, estimators=scores)
+    notes = (*found.notes, *given.left_out)
+    return replace(found, notes=notes, asked=asked, estimator_says=says, estimators=scores)
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ import numpy as np
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 from ferryid.identify.inertia import without_inertia
-from ferryid.identify.inputs import read_logs
+from ferryid.identify.inputs import usable_logs
 from ferryid.identify.log_sums import LogSums, force_free_axes, sum_motions
 from ferryid.identify.model_selection import select_model
 from ferryid.identify.rows import basis_for, known_rows, rows_of
@@ -68,11 +68,12 @@ def sweep_structures(
     Raises
     ------
     FerryIdError
-        For input that cannot be used, with file, cause and remedy.
+        For input that cannot be used, with file, cause and remedy. One of several logs is left out instead, with a note.
     """
     check_folds(folds)
     usable, unusable = usable_bases(settings, profile)
-    opened = read_logs(logs, profile, settings, run)
+    given = usable_logs(logs, profile, replace(settings.on(profile), components="auto"), run, "sweep")
+    opened = given.opened
     kind, says, scores = as_a_fit(opened, profile, settings.on(profile), run)
     asked, settings = settings.estimator, replace(settings, estimator=kind)
     motions = [smooth_measured(one.measured, TEST_WINDOW_S) for one in opened]
@@ -104,7 +105,7 @@ def sweep_structures(
         block_s,
         by,
         unusable,
-        (*_notes(by, settings), *log_warnings([(log["name"], log["warnings"]) for log in told])),
+        (*_notes(by, settings), *log_warnings([(log["name"], log["warnings"]) for log in told]), *given.left_out),
         settings=settings,
         asked=asked,
         estimator_says=says,
