@@ -1,0 +1,71 @@
+"""A fitted model as the plant against the same model as it is exported, which shares no code with the plant."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from ferryid.export.exported import exported
+from ferryid.export.formats import formats
+from ferryid.models.model import Model
+from ferryid.simulate import parse_scenario
+from ferryid.simulate.sections import Payload, Wind
+from ferryid.simulate.vessel_model import sailed_by
+from tests.export.models import SHA, States, fitted, states
+
+TRIAL = """
+schema = "ferryid.scenario/1"
+vessel = "milliampere"
+duration_s = 60
+path = { kind = "four-corner", dwell_s = 15 }
+"""
+FORCE = (300.0, -200.0, 150.0)
+NOTHING = (0.0, 0.0)
+MODELS = {
+    "modulus": fitted("modulus", "decoupled", delta=0.7, sigma=1.6, seed=3),
+    "thesis": fitted("thesis", "decoupled", delta=0.4, sigma=0.4, seed=2),
+    "wind": fitted("modulus+wind-paper", "decoupled", delta=1.1, seed=6),
+    "lift": fitted("lift", "decoupled", delta=0.9, seed=13),
+}
+
+
+def module_of(model: Model) -> SimpleNamespace:
+    """Return the functions of the exported Python module."""
+    namespace: dict[str, object] = {"__name__": "vessel"}
+    exec(compile(formats()["python"].render(exported(model, SHA)), "vessel.py", "exec"), namespace)
+    return SimpleNamespace(**namespace)
+
+
+def accelerations(adrift, model: Model, state: States) -> np.ndarray:
+    """Return those of the plant under `FORCE` in each state."""
+    sailing = sailed_by(parse_scenario(TRIAL, "t"), model)
+    found = []
+    for row in state.rows:
+        run = adrift(
+            sailing.vessel,
+            seconds=0.02,
+            terms=sailing.terms,
+            wind=Wind(*(row["wind"] or NOTHING)),
+            payload=(Payload(*(row["payload"] or NOTHING)),),
+        )
+        _, rows = run.push((0.0, 0.0, row["psi"], *row["nu"]), FORCE, 0.02)
+        found.append(rows[0, 6:9])
+    return np.array(found)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", MODELS)
+def test_it_moves_as_the_exported_model_says(adrift, name: str) -> None:
+    model = MODELS[name]
+    module = module_of(model)
+    for state in states(model):
+        # In a current the hull's coefficients act through the water, a fit's over ground.
+        if state.current is not None:
+            continue
+        wanted = [
+            module.acceleration(FORCE, row["nu"], row["psi"], row["wind"] or NOTHING, None, row["payload"])
+            for row in state.rows
+        ]
+        np.testing.assert_allclose(accelerations(adrift, model, state), wanted, rtol=1e-9, atol=1e-9)
