@@ -89,11 +89,15 @@ class UnmappedTerms:
         Their coefficients on the axes on which no coefficient of a hull stands for them, shape (T, 3).
     intercept
         Shape (3,) [N, N, N·m].
+    zeta
+        Factor on the measured force, (4.5): divides the loads of air, waves and payload. The hull's coefficients are
+        divided already.
     """
 
     functions: tuple[Term, ...]
     theta: Floats
     intercept: Floats
+    zeta: float = 1.0
 
 
 def beside_the_hull(model: Model) -> UnmappedTerms:
@@ -108,7 +112,12 @@ def beside_the_hull(model: Model) -> UnmappedTerms:
     turning = fitted_turning(model)
     theta = np.concatenate([theta, [[-turning[one.name, SURGE], 0.0, 0.0] for one in _TURNING]])
     some = np.flatnonzero(theta.any(axis=1))
-    return UnmappedTerms(tuple((*functions, *_TURNING)[k] for k in some.tolist()), theta[some], model.intercept)
+    return UnmappedTerms(
+        tuple((*functions, *_TURNING)[k] for k in some.tolist()),
+        theta[some],
+        model.intercept,
+        float(model.scale.get("zeta", 1.0)),
+    )
 
 
 def fitted_turning(model: Model) -> Mapping[tuple[str, int], float]:
