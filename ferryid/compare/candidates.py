@@ -10,6 +10,8 @@ from itertools import combinations
 from ferryid.effects.wording import listed
 from ferryid.errors import FerryIdError
 from ferryid.models import Model, blank_model, model_to_json
+from ferryid.signals.copies import has_marks
+from ferryid.signals.stream import Recording
 from ferryid.signals.time_ranges import shares_data
 from ferryid.vessel import parse_profile
 from ferryid.vessel.profile import Profile
@@ -30,12 +32,6 @@ class Candidate:
         """True for the hull in the profile alone."""
         return self.label == BASE
 
-    def trained_on(self, sha256: str) -> bool:
-        """Tell whether the model, or its diagnosis, has learnt from the log of this hash."""
-        seen = {str(log["sha256"]) for log in self.model.training}
-        seen |= {known.sha256 for known in self.model.conditions}
-        return any(shares_data(one, sha256) for one in seen)
-
 
 @dataclass(frozen=True)
 class CandidateSet:
@@ -49,6 +45,14 @@ class CandidateSet:
     def labels(self) -> tuple[str, ...]:
         """Names of the models, in order."""
         return tuple(one.label for one in self.candidates)
+
+
+def trained_on(model: Model, recording: Recording) -> bool:
+    """Tell whether a model, or its diagnosis, has learnt from a log, from a copy of it in another form, or from a part."""
+    seen = {str(log["sha256"]) for log in model.training} | {known.sha256 for known in model.conditions}
+    if any(shares_data(one, recording.sha256) for one in seen):
+        return True
+    return has_marks(recording, [log["motion"] for log in model.training if "motion" in log])
 
 
 def select_candidates(

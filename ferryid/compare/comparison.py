@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ferryid.compare.candidates import Candidate, CandidateSet
+from ferryid.compare.candidates import Candidate, CandidateSet, trained_on
 from ferryid.compare.coefficient_table import coefficient_rows, effect_rows, term_rows
 from ferryid.compare.comparison_result import (
     Coefficients,
@@ -96,6 +96,8 @@ class ComparedLog:
         NaN where a run did not get there.
     warnings
         What a reader must know of this log.
+    trained
+        Labels of the models that were trained on it.
     """
 
     name: str
@@ -114,6 +116,7 @@ class ComparedLog:
     paths: Floats
     path_rows: Ints
     warnings: tuple[str, ...]
+    trained: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -252,10 +255,11 @@ def _compare_log(
         paths[k] = places
     path_rows = np.minimum(starts[:, None] + np.arange(paths.shape[2]) * stride, len(motion.t) - 1)
     predicted = _predict_windows(seen, motion, rows, field.profile)
-    warnings = [*prepared.doubts, *prepared.left_out]
+    warnings, trained = [*prepared.doubts, *prepared.left_out], []
     for one in field.candidates:
         warnings += [f"{one.label}: {caution}" for caution in range_warnings(one.model, motion, rows)]
-        if one.trained_on(sha256):
+        if trained_on(one.model, prepared.recording):
+            trained.append(one.label)
             warnings.append(f"{one.label} was trained on this log: its scores here are no evidence")
     if remembered:
         warnings.append(
@@ -279,6 +283,7 @@ def _compare_log(
         paths=paths,
         path_rows=path_rows,
         warnings=tuple(warnings),
+        trained=tuple(trained),
     )
 
 
@@ -381,7 +386,7 @@ def _pair_errors(field: CandidateSet, compared: Sequence[ComparedLog], runnable:
         runs.append(compare_pairs(sums))
         if horizon <= COMPARE.statement_s and has_enough_blocks(sums):
             told = horizon
-    trained = {one.label for one in field.candidates if any(one.trained_on(log.sha256) for log in compared)}
+    trained = {label for log in compared for label in log.trained}
     return PairedErrors(
         on=compared[0].name if len(compared) == 1 else None,
         labels=field.labels,

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.compare.candidates import trained_on
 from ferryid.compare.thresholds import COMPARE
 from ferryid.errors import FerryIdError
 from ferryid.identify import check_window
@@ -17,7 +18,7 @@ from ferryid.models.forces import Estimator, effective_mass, without_inputs
 from ferryid.models.prediction import Prediction, predict, predict_base, signal_map, window_errors, window_scores
 from ferryid.signals.copies import GivenLogs
 from ferryid.signals.prepare import Prepared, prepare
-from ferryid.signals.time_ranges import shares_data
+from ferryid.signals.stream import Recording
 from ferryid.signals.track import Motion
 from ferryid.signals.usable import left_out_of, usable
 from ferryid.types import Flags, Floats, RunContext
@@ -157,7 +158,7 @@ def _evaluated(model: Model, prepared: Prepared, profile: Profile, window_s: flo
         "outside": outside_ranges(model.ranges, motion, rows),
         "warnings": [
             *prepared.doubts,
-            *_warnings(prepared.recording.sha256, model, motion, rows),
+            *_warnings(prepared.recording, model, motion, rows),
             *prepared.left_out,
         ],
         "data_quality": prepared.quality,
@@ -244,8 +245,8 @@ def range_warnings(model: Model, motion: Motion, rows: Flags) -> list[str]:
     return warnings
 
 
-def _warnings(sha256: str, model: Model, motion: Motion, rows: Flags) -> list[str]:
+def _warnings(recording: Recording, model: Model, motion: Motion, rows: Flags) -> list[str]:
     warnings = range_warnings(model, motion, rows)
-    if any(shares_data(str(log["sha256"]), sha256) for log in model.training):
+    if trained_on(model, recording):
         warnings.append("the model was trained on this log: its scores here are no evidence")
     return warnings

@@ -41,6 +41,7 @@ from ferryid.models import Model, ModelScores
 from ferryid.models.store import check_name
 from ferryid.regression.bases import Basis
 from ferryid.signals.artificial import NO_RECORDING
+from ferryid.signals.copies import motion_marks
 from ferryid.signals.prepare import Opened
 from ferryid.signals.smooth import smooth_measured
 from ferryid.types import Flags, RunContext
@@ -87,10 +88,30 @@ def fit_opened(
     """Fit a correction of a profile's hull to logs that were read and aligned; arguments and errors as of `fit_logs`."""
     chosen = estimator_for(opened, profile, settings, run)
     outcome = fit_and_judge(chosen.data, chosen.components, name, run)
+    model = _with_marks(outcome.model, opened)
+    judged = model if outcome.judged is outcome.model else _with_marks(outcome.judged, opened)
     told = [f"The derivative's estimator was used: {chosen.why}."] if chosen.why else []
     if chosen.estimator == "derivative":
         told += unused_window(settings, chosen.why or _preference(settings))
-    return replace(outcome, warnings=(*outcome.warnings, *chosen.notes, *told), estimators=chosen.scores)
+    return replace(
+        outcome,
+        model=model,
+        judged=judged,
+        warnings=(*outcome.warnings, *chosen.notes, *told),
+        estimators=chosen.scores,
+    )
+
+
+def _with_marks(model: Model, opened: Sequence[Opened]) -> Model:
+    """Return a model whose training logs have the marks by which their copies are known."""
+    recordings = {one.recording.sha256: one.recording for one in opened}
+    return replace(
+        model,
+        training=tuple(
+            {**log, "motion": motion_marks(recordings[log["sha256"]])} if log["sha256"] in recordings else log
+            for log in model.training
+        ),
+    )
 
 
 def _preference(settings: FitSettings) -> str:

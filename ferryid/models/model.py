@@ -67,7 +67,8 @@ class Model:
     ranges
         Ranges of validity, see `ferryid.models.validity`.
     training
-        One entry a log: ``{"name", "files", "sha256", "seconds", "rows"}``.
+        One entry a log: ``{"name", "files", "sha256", "seconds", "rows", "motion"}``, the last as of
+        `ferryid.signals.copies.motion_marks`, which models from before, and of archives, lack.
     scores
         Force errors on validation rows; None of a model that was not judged.
     accepted
@@ -325,3 +326,6 @@ def _check_parts(data: Mapping[str, Any]) -> None:
     for log in data["training"]:
         if not isinstance(log["name"], str) or not isinstance(log["sha256"], str):
             raise TypeError("training does not name its logs")
+        for kept in log.get("motion", {}).values():
+            if not kept["rows"] > 0 or not all(isinstance(one, int) and 0 <= one < 2**52 for one in kept["hashes"]):
+                raise ValueError("the marks of a training log are no hashes of its rows")

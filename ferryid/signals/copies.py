@@ -6,11 +6,13 @@ recording all the same: it would train and validate on the same data, and count 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from ferryid.cached import cached_property
 from ferryid.errors import FerryIdError
@@ -24,7 +26,10 @@ ROWS = 8
 """Rows in sequence that have to be alike at such a place."""
 TRIED = 50
 """Places at which the first of these rows is tried, most."""
-COMPARED = (("x", "y"), ("u", "v"), ("psi",))
+MARKS = 100
+"""Places of a log, evenly spaced, whose samples are kept as hashes, most."""
+HEADING = "psi"
+COMPARED = (("x", "y"), ("u", "v"), (HEADING,))
 """Signals of one topic that are compared: the first of them that both logs have and that changes."""
 
 
@@ -75,6 +80,47 @@ def same_recording(one: Recording, other: Recording) -> bool:
     return first.same(second)
 
 
+def motion_marks(recording: Recording) -> dict[str, Any]:
+    """Return hashes of samples in sequence, by which `has_marks` knows a copy or a piece of the log without the log itself.
+
+    Returns
+    -------
+    dict
+        By the names of signals in `COMPARED`, ``{"rows": n, "hashes": [...]}``; without those that hardly change.
+    """
+    marks = {}
+    for wanted in COMPARED:
+        kept = _Sequence(_signals(recording, wanted))
+        if len(kept.values) >= ROWS and len(hashes := kept.marks):
+            marks[_key(wanted)] = {"rows": len(kept.values), "hashes": hashes.tolist()}
+    return marks
+
+
+def has_marks(recording: Recording, several: Sequence[Mapping[str, Any]]) -> bool:
+    """Return whether a log holds one of the recordings that `motion_marks` are of, or a piece of one, or is a piece."""
+    if not several:
+        return False
+    values = {_key(wanted): _signals(recording, wanted) for wanted in COMPARED}
+    hashes = {key: _every_hash(one) for key, one in values.items() if len(one) >= ROWS}
+    return any(_marked(hashes, marks) for marks in several)
+
+
+def _marked(hashes: Mapping[str, Ints], marks: Mapping[str, Any]) -> bool:
+    """Return whether enough of a log's marks are among the hashes of another one, by the names of signals.
+
+    Positions are counted from the first fix where they were latitudes, and unlike in a piece: velocities are looked at too. A
+    heading turns through the same coarse values in many trials, and counts only where a log has neither.
+    """
+    shared = [key for key in hashes if key in marks]
+    for key in shared[:-1] if len(shared) > 1 and shared[-1] == HEADING else shared:
+        kept = marks[key]
+        found = np.isin(np.array(kept["hashes"], dtype=np.int64), hashes[key]).sum()
+        possible = len(kept["hashes"]) * min(1.0, (len(hashes[key]) + ROWS - 1) / kept["rows"])
+        if found >= max(SIGNALS.least_marks, SIGNALS.shared_samples * possible):
+            return True
+    return False
+
+
 def searchable(recordings: Sequence[Recording]) -> list[Searchable]:
     """Return the samples of recordings, each of which is to be compared with several: what is sorted is sorted once."""
     return [Searchable(tuple(_Sequence(_signals(one, wanted)) for wanted in COMPARED)) for one in recordings]
@@ -121,6 +167,11 @@ class _Sequence:
         # Steps of a coarse sensor, or of one that repeats its values, look alike by chance.
         return np.asarray(every[different > ROWS // 2])
 
+    @property
+    def marks(self) -> Ints:
+        """Hashes of at most `MARKS` pieces."""
+        return _hashes(self._pieces[:: SAMPLES // MARKS])
+
     def found_share(self, longer: _Sequence) -> float | None:
         """Return the share of pieces that another series has as well; None where this one hardly changes."""
         pieces = self._pieces
@@ -141,3 +192,23 @@ def _signals(recording: Recording, wanted: tuple[str, ...]) -> Floats:
         return np.empty((0, len(wanted)), dtype=np.float32)
     values = np.column_stack([stream.columns[name] for name in wanted]).astype(np.float32)
     return np.asarray(values[np.isfinite(values).all(axis=1)])
+
+
+def _key(wanted: tuple[str, ...]) -> str:
+    return " ".join(wanted)
+
+
+def _every_hash(values: Floats) -> Ints:
+    """Return the hashes of all `ROWS` in sequence, shape (n - ROWS + 1,)."""
+    return _hashes(sliding_window_view(values, ROWS, axis=0).transpose(0, 2, 1))
+
+
+def _hashes(pieces: Floats) -> Ints:
+    """Return FNV-1a over the samples of each piece, shape (n, ROWS, signals), as 52 bits, which JSON holds exactly."""
+    hashes = np.full(len(pieces), 0xCBF29CE484222325, dtype=np.uint64)
+    for row in range(pieces.shape[1]):
+        for signal in range(pieces.shape[2]):
+            # Adding zero makes zero of minus zero.
+            bits = (pieces[:, row, signal] + np.float32(0.0)).astype(np.float32).view(np.uint32)
+            hashes = (hashes ^ bits) * np.uint64(0x100000001B3)
+    return np.asarray((hashes ^ (hashes >> np.uint64(32))) & np.uint64(2**52 - 1), dtype=np.int64)

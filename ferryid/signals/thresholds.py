@@ -464,6 +464,12 @@ class SignalThresholds:
         "samples in sequence that another log has as well, above which both hold one recording",
         "convention: a tenth; no two recordings have eight changing samples in sequence alike",
     )
+    least_marks: int = threshold(
+        2,
+        "places of a training log",
+        "samples in sequence whose hashes a model file has, found in another log, from which that can be the training log",
+        "convention: more than one, as at shared_samples; a hash is equal to another by chance once in 4e15",
+    )
 
     summed_digits: float = threshold(
         1e-5,

@@ -11,7 +11,7 @@ from typing import Any
 from ferryid.effects import effects
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.models import Conditions, Model, StoredEffect
-from ferryid.models.forces import UnmappedTerms, beside_the_hull, hull_coefficients, replace_hull_coefficients
+from ferryid.models.forces import UnmappedTerms, beside_the_hull, moving_coefficients, replace_hull_coefficients
 from ferryid.signals.recording import log_name
 from ferryid.simulate.check_scenario import vessel_of
 from ferryid.simulate.plant.beside import FACTORS
@@ -34,14 +34,14 @@ VESSEL_KEYS = (
 class Sailing:
     """A scenario as a model sails it: what was changed in it, the vessel, and what of the scenario was set aside.
 
-    `terms` is what the model has beside the hull of the vessel; None where it has nothing. `conditions` is the name, in the
-    model, of the log whose conditions prevail, however it was given; empty without one.
+    `terms` is what the model has beside the hull of the vessel. `conditions` is the name, in the model, of the log whose
+    conditions prevail, however it was given; empty without one.
     """
 
     scenario: Scenario
     vessel: Profile
     notes: tuple[str, ...]
-    terms: UnmappedTerms | None = None
+    terms: UnmappedTerms
     conditions: str = ""
 
 
@@ -74,7 +74,7 @@ def sailed_by(scenario: Scenario, model: Model, conditions: str = "") -> Sailing
             "Fix: give a model and a scenario of one vessel"
         )
     terms = beside_the_hull(model)
-    left = [] if terms is None else [one.name for one in terms.functions if not set(one.factors) <= set(FACTORS)]
+    left = [one.name for one in terms.functions if not set(one.factors) <= set(FACTORS)]
     if left:
         raise FerryIdError(
             f"{model.label}: the simulated vessel cannot have the model's terms {', '.join(left)}: neither a hull nor the "
@@ -96,7 +96,7 @@ def sailed_by(scenario: Scenario, model: Model, conditions: str = "") -> Sailing
         raise FerryIdError(f"with {', '.join(_names(stored))} of {model.label}, {error}") from error
     return Sailing(
         changed,
-        replace(own, hull=replace_hull_coefficients(own.hull, hull_coefficients(model))),
+        replace(own, hull=replace_hull_coefficients(own.hull, moving_coefficients(model))),
         tuple(f"the scenario's [{'.'.join(place)}] is set aside: the vessel is {model.label}" for place in aside),
         terms,
         "" if chosen is None else chosen.log,

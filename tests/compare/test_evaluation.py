@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 
 from ferryid.compare import evaluate
+from ferryid.compare.candidates import select_candidates
+from ferryid.compare.comparison import compare
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json
 from ferryid.identify import FitOutcome, FitSettings, fit_logs
@@ -218,6 +220,26 @@ def test_a_copy_in_another_format_is_no_second_log(tmp_path: Path) -> None:
         FerryIdError, match=r"short\.bag: holds the recording of .*short\.mcap, or a piece of it.*Fix: "
     ):
         evaluate(model, [str(LOG), str(LOG.with_suffix(".bag"))], RunContext(tmp_path))
+
+
+@pytest.mark.slow
+def test_a_training_log_in_another_format_and_a_part_of_it_are_no_evidence(fitted: FitOutcome, tmp_path: Path) -> None:
+    def warned(log: Path, model: Model = fitted.model, **of_log: object) -> bool:
+        told = evaluate(model, [str(log)], RunContext(tmp_path, **of_log))
+        return "the model was trained on this log: its scores here are no evidence" in told["logs"][0]["warnings"]
+
+    copy = LOG.with_suffix(".bag")
+    assert warned(LOG)
+    assert warned(copy)
+    assert warned(copy, ranges=(("20", "60"),))
+    assert not warned(LOG.with_name("second.bag"))
+    # A file from before has a hash alone.
+    old = tuple({key: value for key, value in log.items() if key != "motion"} for log in fitted.model.training)
+    assert not warned(copy, replace(fitted.model, training=old))
+    field = select_candidates(
+        ["new", "bare"], [replace(fitted.model, version=1), replace(fitted.model, version=2, training=())]
+    )
+    assert compare(field, [str(copy)], RunContext(tmp_path)).logs[0].trained == ("milliampere@1",)
 
 
 @pytest.mark.slow

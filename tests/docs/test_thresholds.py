@@ -155,7 +155,7 @@ NO_DECISION = {
         regression.random_effects _GOLDEN _REFINEMENTS _RIDGE _SPREADS
     """,
     "sizes: rows held at once, draws, folds, bins, and how much is shown": """
-        signals.copies SAMPLES ROWS TRIED
+        signals.copies SAMPLES ROWS TRIED MARKS
         identify.weak_rows _CHUNK_WINDOWS
         regression.test_function _CHUNK_WINDOWS
         identify.shared_rows MOST_ROWS

@@ -120,7 +120,7 @@ def without_a_moment(log: Measured) -> Measured:
 def test_a_log_too_short_to_fit_says_what_it_leaves_open_as_well(opened: Opened) -> None:
     short = without_a_moment(measured(1, seconds=36.0, jitter=0.03))
     with pytest.raises(
-        FerryIdError, match=f"too short for three blocks .* are needed. {UNKNOWN}.*sides. Fix: use a longer"
+        FerryIdError, match=f"too short for three blocks .* are needed. {UNKNOWN}.*sides. Fix: give a longer"
     ):
         fit_opened([replace(opened, measured=short)], PROFILE, FitSettings(), RunContext(Path("nowhere")), "short")
 

@@ -8,7 +8,7 @@ from typing import cast
 import numpy as np
 import pytest
 
-from ferryid.signals.copies import same_recording, searchable
+from ferryid.signals.copies import ROWS, has_marks, motion_marks, same_recording, searchable
 from ferryid.signals.stream import Recording
 from ferryid.types import Floats
 
@@ -32,6 +32,28 @@ def test_a_copy_and_a_piece_are_the_same_recording(part: slice) -> None:
     piece = recording(**cut(whole, part))
     assert same_recording(recording(**whole), piece)
     assert same_recording(piece, recording(**whole))
+
+
+@pytest.mark.parametrize("part", [slice(None), slice(0, 1500), slice(300, None), slice(900, 1100)])
+def test_marks_know_a_copy_and_a_piece_and_no_other_trial(part: slice) -> None:
+    whole, piece = track(1), recording(**cut(track(1), part))
+    assert has_marks(piece, [motion_marks(recording(**whole))])
+    assert has_marks(recording(**whole), [motion_marks(piece)])
+    assert not has_marks(recording(**track(2)), [motion_marks(piece)])
+    single = {name: values.astype(np.float32).astype(np.float64) for name, values in whole.items()}
+    assert has_marks(recording(**single), [motion_marks(piece)])
+
+
+def test_marks_of_a_position_from_the_first_fix_of_each_piece_leave_it_to_the_velocity() -> None:
+    whole = {**track(1), "u": track(3)["x"], "v": track(3)["y"]}
+    piece = cut(whole, slice(500, 1500))
+    moved = {**piece, "x": piece["x"] - 7.3, "y": piece["y"] + 2.1}
+    assert has_marks(recording(**moved), [motion_marks(recording(**whole))])
+
+
+def test_marks_of_a_log_that_lies_still_are_none() -> None:
+    assert motion_marks(recording(x=np.zeros(500), y=np.zeros(500))) == {}
+    assert motion_marks(recording(**cut(track(1), slice(0, ROWS - 1)))) == {}
 
 
 def test_another_format_rounds_the_values() -> None:

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from ferryid.effects.force_model import COEFFICIENTS, UNITS, hull_of
 from ferryid.errors import FerryIdError
+from ferryid.identify.pipeline import fit_logs
+from ferryid.identify.settings import FitSettings
+from ferryid.models.coefficients.intervals import coefficient_intervals, term_interval
 from ferryid.models.forces import MAPPED, model_estimator
 from ferryid.models.model import Model
 from ferryid.models.stored_effect import Conditions, Quantity
 from ferryid.regression.bases import make_basis
-from ferryid.simulate import load_scenario, parse_scenario, simulate
+from ferryid.simulate import Simulation, load_scenario, parse_scenario, simulate, write_log
 from ferryid.simulate.vessel_model import sailed_by
+from ferryid.types import RunContext
 from ferryid.vessel import load_profile
 from tests.models.test_store import made
 from tests.models.test_stored_effect import BROKEN, FERRY, FOULED, HERE, WINDY, diagnosed, stored
@@ -147,6 +152,26 @@ def test_terms_that_no_hull_has_act_beside_it() -> None:
     flows = [np.tile(flow, (n, 1)) for flow in ([2.0, -3.0], [0.2, 0.1])]
     needed = model_estimator(model)(truth.nu_dot, truth.nu, truth.eta[:, 2], *flows)
     np.testing.assert_allclose(needed, truth.tau, rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.slow
+def test_a_fit_to_what_a_fitted_model_sailed_gives_its_coefficients_back(tmp_path: Path) -> None:
+    scenario = load_scenario("twelve-corner-calm")
+    # Base model and truth are far apart, so that the terms that are fitted are large.
+    settings = FitSettings(delta=0.4, sigma=0.4)
+
+    def fit_to(simulation: Simulation, name: str) -> Model:
+        write_log(simulation, tmp_path / name)
+        return fit_logs([str(tmp_path / name)], FERRY, settings, RunContext(tmp_path)).model
+
+    model = fit_to(simulate(scenario, 3), "profile.mcap")
+    sailing = sailed_by(scenario, model)
+    again = fit_to(simulate(sailing.scenario, 5, vessel=sailing.vessel, terms=sailing.terms), "model.mcap")
+    wanted, found = coefficient_intervals(model), coefficient_intervals(again)
+    for term in ("vr", "rr"):
+        wanted[term], found[term] = (term_interval(one, term, 0) for one in (model, again))
+    out = [name for name in found if not found[name][1] <= wanted[name][0] <= found[name][2]]
+    assert out == []
 
 
 def test_what_cannot_be_sailed_is_told() -> None:

@@ -20,6 +20,7 @@ from ferryid.diagnose.judging.finding import Finding
 from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.models import Quantity, Source, StoredEffect
+from ferryid.signals.copies import motion_marks
 from ferryid.types import Floats
 
 
@@ -171,6 +172,7 @@ def trained(survey: Survey) -> dict[str, object]:
         "sha256": recording.sha256,
         "seconds": used.seconds,
         "rows": used.rows,
+        "motion": motion_marks(recording),
     }
 
 

@@ -79,18 +79,22 @@ def build(
     n = 2 * steps + 1
     effects = acting(scenario)
     added = build_added(effects, profile)
+    beside = beside_of(terms)
+    zeta = beside.zeta
     return Plant(
         p=p,
         areas=areas_of(profile.wind),
         wind=np.column_stack(wind_series(scenario, seed, n, 0.5 * h)),
         current=current_series(scenario.current, n, 0.5 * h),
         turn_radps=turn_rate(scenario.current),
-        phases=phases_of(p, profile, scenario.payload, effects, scenario.thrusters.faults, h, steps),
+        phases=phases_of(p, profile, scenario.payload, effects, scenario.thrusters.faults, h, steps, zeta),
         gear=gear_of(profile, scenario.thrusters, h, added),
-        sea=sea_of(profile, scenario.waves, scenario.wakes, seed, (p[0] - m, p[1] - m, p[4] - I_z)),
+        sea=sea_of(
+            profile, scenario.waves, scenario.wakes, seed, (zeta * p[0] - m, zeta * p[1] - m, zeta * p[4] - I_z)
+        ),
         added=added,
         shallow=patch_of(scenario.shallow),
-        beside=beside_of(terms),
+        beside=beside,
     )
 
 
@@ -149,9 +153,10 @@ def derivative(plant: Plant, phase: int, node: int, i: int, t: float, state: Sta
     C = coriolis_load(mass[0], mass[1], mass[2], u_r, v_r, r)
     D = damping_load(plant.p, u_r, v_r, r)
     factor = damping_factor(plant.shallow, x, y)
-    X = tau[0] + wave[0] + blown[0] - C[0] - factor * D[0]
-    Y = tau[1] + wave[1] + blown[1] - C[1] - factor * D[1]
-    N = tau[2] + wave[2] + blown[2] - C[2] - factor * D[2]
+    zeta = plant.beside.zeta
+    X = tau[0] + wave[0] / zeta + blown[0] / zeta - C[0] - factor * D[0]
+    Y = tau[1] + wave[1] / zeta + blown[1] / zeta - C[1] - factor * D[1]
+    N = tau[2] + wave[2] / zeta + blown[2] / zeta - C[2] - factor * D[2]
     more = added_load(plant.added, t, x, y, psi, u, v, r, u_r, v_r)
     X, Y, N = X + more[0], Y + more[1], N + more[2]
     learned = beside_load(plant.beside, u, v, r, u_rw, v_rw, u_r, v_r)

@@ -11,11 +11,14 @@ Masses = tuple[float, float, float, float, float]
 """m11, m22, m23, m32, m33; everything else of a mass matrix is zero."""
 
 
-def loaded(hull: Hydrodynamics | Masses, aboard: Sequence[Payload]) -> Masses:
-    """Return the mass matrix with payload aboard, ``[[m, 0, 0], [0, m, m x], [0, m x, m x²]]`` each, on the centre line."""
+def loaded(hull: Hydrodynamics | Masses, aboard: Sequence[Payload], zeta: float = 1.0) -> Masses:
+    """Return the mass matrix with payload aboard, ``[[m, 0, 0], [0, m, m x], [0, m x, m x²]]`` each, on the centre line.
+
+    `zeta` divides each payload's mass, as it has divided the hull's.
+    """
     m11, m22, m23, m32, m33 = hull[:5]
     for payload in aboard:
-        m, x = payload.mass_kg, payload.x_m
+        m, x = payload.mass_kg / zeta, payload.x_m
         m11, m22, m23, m32, m33 = m11 + m, m22 + m, m23 + m * x, m32 + m * x, m33 + m * x * x
     return m11, m22, m23, m32, m33
 

@@ -56,8 +56,9 @@ def phases_of(
     faults: Sequence[Fault],
     h: float,
     steps: int,
+    zeta: float = 1.0,
 ) -> Phases:
-    """Return the phases of a trial of `steps` steps of `h` seconds.
+    """Return the phases of a trial of `steps` steps of `h` seconds; `zeta` divides the force that moves the payload.
 
     Raises
     ------
@@ -90,8 +91,8 @@ def phases_of(
     )
     for s, start in enumerate(starts):
         aboard = [one for one in payload if _on(one, start, h)]
-        M = loaded(p, aboard)
-        kept = loaded(p, [one for one in aboard if _on(one, start - 1, h)]) if s else M
+        M = loaded(p, aboard, zeta)
+        kept = loaded(p, [one for one in aboard if _on(one, start - 1, h)], zeta) if s else M
         phases.mass[s] = M[0], M[1], 0.5 * (M[2] + M[3])
         phases.inverse[s] = inverse(M)
         phases.boarding[s] = boarding(kept, M) if kept != M else (1.0, 1.0, 0.0, 0.0, 1.0)

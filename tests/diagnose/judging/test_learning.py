@@ -198,7 +198,7 @@ def test_what_was_learned_is_exported_and_simulated(taught: tuple[Model, Diagnos
     made = export_model(stored.label, "python", folder)
     run = subprocess.run([sys.executable, made["file"]], capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr
-    assert beside_the_hull(stored) is not None
+    assert beside_the_hull(stored).functions
     sailing = sailed_by(parse_scenario(SHORT, "t"), stored, "windy")
     truth = simulate(sailing.scenario, 3, vessel=sailing.vessel, terms=sailing.terms).truth
     assert np.isfinite(truth.nu).all()

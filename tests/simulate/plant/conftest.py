@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from ferryid.compiled import compiled
+from ferryid.models.forces import UnmappedTerms
 from ferryid.simulate.plant.hull import Force, State
 from ferryid.simulate.plant.motion import Plant, advance, build, resting
 from ferryid.simulate.scenario import NOWHERE, Scenario
@@ -69,13 +70,18 @@ def direct(profile: Profile = MILLIAMPERE) -> Profile:
 
 @pytest.fixture(scope="session")
 def make() -> Callable[..., Run]:
-    """Return a function that builds a plant: ``make(profile, h, seconds, seed, **sections of the scenario)``."""
+    """Return a function that builds a plant: ``make(profile, h, seconds, seed, terms, **sections of the scenario)``."""
 
     def built(
-        profile: Profile = MILLIAMPERE, h: float = 0.02, seconds: float = 10.0, seed: int = 1, **sections: object
+        profile: Profile = MILLIAMPERE,
+        h: float = 0.02,
+        seconds: float = 10.0,
+        seed: int = 1,
+        terms: UnmappedTerms | None = None,
+        **sections: object,
     ) -> Run:
         scenario = Scenario("test", "", profile.name, NOWHERE, seconds, 0, seed, **sections)  # type: ignore[arg-type]
-        plant = build(scenario, profile, seed, h, round(seconds / h))
+        plant = build(scenario, profile, seed, h, round(seconds / h), terms)
         return Run(plant, h, resting(plant))
 
     return built
