@@ -12,6 +12,7 @@ import numpy as np
 
 from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError
+from ferryid.files import resolved
 from ferryid.ingest import log_suffixes, open_log
 from ferryid.ingest.clocks import ClockReport, Rows, repair_all
 from ferryid.ingest.hashing import content_hash
@@ -224,7 +225,7 @@ def log_name(path: str | Path) -> str:
     """Name of a log for folders and reports: file or folder name without suffixes, parts counted."""
     text = str(path)
     first, _, more = text.partition("+") if not Path(text).exists() else (text, "", "")
-    file = Path(first).resolve()
+    file = resolved(first)
     stem = file.stem if file.suffix in {Path(f"_{suffix}").suffix for suffix in log_suffixes()} else file.name
     clean = re.sub(r"[^A-Za-z0-9._-]+", "_", stem).strip("._") or "log"
     return f"{clean}-and-{more.count('+') + 1}-more" if more else clean

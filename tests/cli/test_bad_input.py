@@ -249,6 +249,33 @@ def test_a_folder_in_the_place_of_a_json_result(ferryid, fixtures: Path, tmp_pat
         refused(ferryid(*command, "--json", tmp_path), f"{tmp_path}: is a folder, and a file was to be written")
 
 
+@pytest.fixture
+def circle(tmp_path: Path) -> Path:
+    """Give a link that leads to another one, which leads back to it."""
+    (tmp_path / "one").symlink_to(tmp_path / "other")
+    (tmp_path / "other").symlink_to(tmp_path / "one")
+    return tmp_path / "one"
+
+
+@pytest.mark.parametrize("command", ["inspect", "fit", "ingest", "batch"])
+def test_links_that_lead_round_in_a_circle_are_no_log(ferryid, tmp_path: Path, circle: Path, command: str) -> None:
+    options = () if command == "inspect" else ("--out", tmp_path / "out")
+    refused(ferryid(command, circle, "--vessel", "milliampere", *options), str(circle))
+
+
+def test_links_that_lead_round_in_a_circle_are_no_place_for_a_result(
+    ferryid, fixtures: Path, tmp_path: Path, circle: Path
+) -> None:
+    fit = ("fit", fixtures / "short.mcap", "--vessel", "milliampere", "--out", tmp_path / "out")
+    simulate = ("simulate", fixtures / "short.toml", "--out", tmp_path / "out")
+    refused(ferryid(*fit, "--json", circle), f"{circle}: is a link that leads round in a circle", "--json another name")
+    refused(ferryid(*fit, "--json", circle / "x.json"), f"{circle}: is a link to nothing", "--json")
+    refused(ferryid(*simulate, "--log", circle / "x.mcap"), f"{circle} is no folder")
+    refused(ferryid(*simulate, "--log", circle.with_name("x.mcap"), "--json", circle), str(circle))
+    assert not (tmp_path / "out").exists()
+    assert circle.is_symlink()
+
+
 @pytest.mark.slow
 def test_a_full_disk(ferryid, fixtures: Path, tmp_path: Path) -> None:
     if not os.path.exists("/dev/full"):
