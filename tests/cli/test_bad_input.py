@@ -276,6 +276,19 @@ def test_links_that_lead_round_in_a_circle_are_no_place_for_a_result(
     assert circle.is_symlink()
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems take no such name")
+def test_places_whose_names_hold_bytes_that_are_no_characters(ferryid, fixtures: Path, tmp_path: Path) -> None:
+    out = tmp_path / os.fsdecode(b"o\xff")
+    run = ferryid("ingest", fixtures / "short.mcap", "--vessel", "milliampere", "--out", out)
+    assert run.code == 0, run.err
+    assert list(out.rglob("*.parquet"))
+    truth = tmp_path / os.fsdecode(b"t\xff.parquet")
+    run = ferryid("simulate", fixtures / "short.toml", "--out", out, "--truth", truth)
+    assert run.code == 0, run.err
+    run = ferryid("inspect", truth)
+    assert run.code == 0, run.err
+
+
 @pytest.mark.slow
 def test_a_full_disk(ferryid, fixtures: Path, tmp_path: Path) -> None:
     if not os.path.exists("/dev/full"):
