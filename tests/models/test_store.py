@@ -143,6 +143,8 @@ def test_a_wrong_reference_is_told(tmp_path: Path, reference: str, told: str) ->
         (lambda data: data.update(schema="ferryid.model/0"), "not a ferryid model"),
         (lambda data: data["coefficients"]["yaw"]["u"].update(value=10**400), "missing or wrong"),
         (lambda data: data["coefficients"]["yaw"]["u"].update(value=float("inf")), "not finite"),
+        (lambda data: data["scores"].update(interval=[]), "missing or wrong"),
+        (lambda data: data["scores"].update(interval=[0.5]), "missing or wrong"),
     ],
 )
 def test_a_damaged_or_newer_file_is_told(tmp_path: Path, change, told: str) -> None:
