@@ -289,6 +289,22 @@ def test_places_whose_names_hold_bytes_that_are_no_characters(ferryid, fixtures:
     assert run.code == 0, run.err
 
 
+@pytest.mark.parametrize("words", [["--version"], ["--help"]], ids=" ".join)
+@pytest.mark.parametrize("buffered", [True, False])
+def test_a_full_standard_output(words: list[str], buffered: bool) -> None:
+    if not os.path.exists("/dev/full"):
+        pytest.skip("no /dev/full on this machine")
+    python = [sys.executable, *([] if buffered else ["-u"]), "-c", "from ferryid.cli.entry import main; main()"]
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [*python, *words], stdout=full, stderr=subprocess.PIPE, text=True, check=False, env=environment
+        )
+    assert done.returncode == 2
+    assert done.stderr.startswith("ferryid: standard output: No space left on device. Fix: ")
+    assert done.stderr.count("\n") == 1
+
+
 @pytest.mark.slow
 def test_a_full_disk(ferryid, fixtures: Path, tmp_path: Path) -> None:
     if not os.path.exists("/dev/full"):
