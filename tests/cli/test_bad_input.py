@@ -474,3 +474,15 @@ def csv_profile(tmp_path: Path) -> Path:
     path = tmp_path / "table.toml"
     path.write_text("".join(parts), encoding="utf-8")
     return path
+
+
+def test_a_mapped_column_whose_name_another_one_has(ferryid, fixtures: Path, tmp_path: Path) -> None:
+    head, *rows = (fixtures / "short.csv").read_text(encoding="utf-8").splitlines()
+    log = tmp_path / "twice.csv"
+    log.write_text("\n".join([f"{head},u [m/s]", *(f"{row},9" for row in rows)]), encoding="utf-8")
+    said = '2 columns are named "u [m/s]": the first is used.'
+    profile = csv_profile(tmp_path)
+    assert said in ferryid("inspect", log, "--vessel", profile).out
+    for _ in range(2):  # read, and then from the cache
+        assert said in ferryid("fit", log, "--vessel", profile, "--no-report", "--out", tmp_path / "out").out
+    assert "columns are named" not in ferryid("inspect", fixtures / "short.csv", "--vessel", profile).out
