@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from ferryid.report.outcome import Outcome
 
 
+_NAME_FOLLOWS = {"promote": "NAME@VERSION", "rollback": "NAME"}
+"""What follows the words that change which version is current; a model may be named like one of them."""
+
+
 def command(
     words: Annotated[
         list[str] | None,
@@ -64,6 +68,10 @@ def command(
     elif others:
         raise FerryIdError(_too_many(first, others))
     else:
+        if first in _NAME_FOLLOWS and not (out / "models" / first).is_dir():
+            raise FerryIdError(
+                f"models {first}: the name of a model is missing. Fix: write ferryid models {first} {_NAME_FOLLOWS[first]}"
+            )
         emit(api.show_model(first, out) if first else api.models(out), json)
 
 

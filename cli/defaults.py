@@ -154,6 +154,8 @@ def _written(option: Any, settings: FolderSettings, key: tuple[str, ...], value:
         if isinstance(one, bool) != bool(option.is_flag) or not isinstance(one, str | int | float):
             takes = "true or false" if option.is_flag else "a text or number"
             raise settings.fault(key, f"{name} takes {takes}, found {one!r}. Fix: correct the value")
+        if one == "":
+            raise settings.fault(key, f"{name} is empty. Fix: give it a value, or remove the line")
     if option.is_flag:
         return [name] if value else []
     return [f"{name}={_placed(option.name, settings, str(one))}" for one in values]

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import gc
 import os
+import stat
 import sys
 from typing import TYPE_CHECKING
 
@@ -28,8 +30,7 @@ def main() -> None:
         _open_streams()
         if sys.argv[1:] == ["--version"]:
             # What scripts ask most often needs no parser.
-            sys.stdout.write(f"ferryid {ferryid.__version__}\n")
-            return
+            sys.exit(_version())
         from ferryid import interrupts
         from ferryid.report import page_process
 
@@ -45,6 +46,18 @@ def main() -> None:
         # Before or after the command.
         os.write(2, INTERRUPTED)
         os._exit(130)
+
+
+def _version() -> int:
+    """Print the version and return the exit code."""
+    try:
+        sys.stdout.write(f"ferryid {ferryid.__version__}\n")
+        sys.stdout.flush()
+    except BrokenPipeError:
+        _drop_output()
+    except OSError as error:
+        return _failed(error)
+    return 0
 
 
 def run(last: Callable[[int], object] | None = None) -> None:
@@ -78,7 +91,7 @@ def _run() -> object:
 
     from ferryid import interrupts
     from ferryid.cli.error_pages import MEMORY, PLACE, section, see
-    from ferryid.errors import FerryIdError, UnwritableError, one_line
+    from ferryid.errors import FerryIdError, UnwritableError
 
     # What NumPy cannot compute becomes NaN, and is told where it matters.
     warnings.simplefilter("ignore", RuntimeWarning)
@@ -105,15 +118,10 @@ def _run() -> object:
         return 2
     except BrokenPipeError:
         # The reader of our output (head, less) has gone: nothing to say and nobody to say it to.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _drop_output()
         return 0
     except OSError as error:
-        what = f"{error.filename}: " if error.filename else ""
-        sys.stderr.write(
-            f"ferryid: {one_line(f'{what}{error.strerror or error}')}. Fix: check the path, its permissions and the disk"
-            f"{see(PLACE)}\n"
-        )
-        return 2
+        return _failed(error)
     except MemoryError:
         sys.stderr.write(
             f"ferryid: there is not enough memory for this log. Fix: cut it, or give a lower --rate{see(MEMORY)}\n"
@@ -129,6 +137,35 @@ def _run() -> object:
                 f"ferryid {ferryid.__version__}: this is a bug of ferryid. Please report it with these lines\n"
             )
         return 1
+
+
+def _failed(error: OSError) -> int:
+    """Say in one line what the system could not read or write, and return the exit code."""
+    from ferryid.cli.error_pages import PLACE, see
+    from ferryid.errors import one_line
+
+    what, fix = f"{error.filename}: " if error.filename else "", "check the path, its permissions and the disk"
+    if not error.filename and error.errno == errno.ENOSPC and _output_is_full():
+        what, fix = "standard output: ", "free some space, or send it elsewhere"
+        _drop_output()
+    sys.stderr.write(f"ferryid: {one_line(f'{what}{error.strerror or error}')}. Fix: {fix}{see(PLACE)}\n")
+    return 2
+
+
+def _output_is_full() -> bool:
+    """Tell whether standard output goes to a full disk, or to a device such as /dev/full."""
+    try:
+        number = sys.stdout.fileno()
+        if stat.S_ISREG(os.fstat(number).st_mode):
+            return hasattr(os, "fstatvfs") and os.fstatvfs(number).f_bavail == 0
+        return stat.S_ISCHR(os.fstat(number).st_mode) and not os.isatty(number)
+    except OSError:
+        return False
+
+
+def _drop_output() -> None:
+    """Send what is left of standard output nowhere: Python would try once more at its end, and fail."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _open_streams() -> None:

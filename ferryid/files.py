@@ -365,8 +365,10 @@ def no_folder(path: Path, by: str = "--out") -> UnwritableError:
     )
 
 
-def check_folder(path: Path) -> None:
+def check_folder(path: Path, by: str = "--out") -> None:
     """Refuse a place for results that is no folder, or lies below something that is none; nothing need be there yet.
+
+    `by` is the option that names another place.
 
     Raises
     ------
@@ -376,9 +378,9 @@ def check_folder(path: Path) -> None:
     try:
         file = _file_for_folder(path)
     except OSError as error:
-        raise unwritable(path, error) from error
+        raise unwritable(path, error, by) from error
     if file:
-        raise no_folder(file)
+        raise no_folder(file, by)
 
 
 def taken(path: Path) -> FerryIdError:
@@ -399,6 +401,14 @@ def write_bytes(path: Path, content: bytes, *, by: str = "--out") -> None:
         temporary.write_bytes(content)
 
 
+def resolved(path: str | Path) -> Path:
+    """Return what a path leads to, absolute; of one that leads nowhere, or round in a circle, the place where it ends.
+
+    `Path.resolve` raises a RuntimeError for links that lead round in a circle before Python 3.13.
+    """
+    return Path(os.path.realpath(path))
+
+
 def check_result(path: Path) -> bool:
     """Refuse a place for a JSON result that holds anything but an earlier one; tell whether it is a device.
 
@@ -412,6 +422,12 @@ def check_result(path: Path) -> bool:
         other = path.is_file() and path.suffix != ".json" and path.stat().st_size > 0
     except OSError as error:
         raise unwritable(path, error, "--json") from error
+    check_folder(path.parent, "--json")
+    if resolved(path).is_symlink():
+        raise UnwritableError(
+            f"{path}: is a link that leads round in a circle, so that nothing can be written there. "
+            "Fix: give --json another name"
+        )
     if path.is_dir():
         raise UnwritableError(f"{path}: is a folder, and a file was to be written. Fix: give --json the name of a file")
     if other:
@@ -430,7 +446,7 @@ def write_result(path: Path, text: str) -> None:
         When the place holds anything but an earlier JSON file, or cannot be written.
     """
     if not check_result(path):
-        write_text(path.resolve() if path.is_symlink() else path, text, by="--json")
+        write_text(resolved(path) if path.is_symlink() else path, text, by="--json")
         return
     try:
         with path.open("w", encoding="utf-8") as device:

@@ -12,6 +12,7 @@ from pathlib import Path
 from ferryid.batch.log_result import LogFile
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.files import resolved
 from ferryid.ingest import existing_parts, log_suffixes
 
 COLUMNS = ("log", "vessel", "date", "note")
@@ -56,7 +57,7 @@ class Entry:
         """Absolute paths of its parts; of what is not there, where it should be."""
         whole = Path(self.log)
         parts = [] if whole.exists() else existing_parts(self.log)
-        return [part.resolve() for part in parts or [whole]]
+        return [resolved(part) for part in parts or [whole]]
 
     @property
     def files(self) -> tuple[LogFile, ...]:

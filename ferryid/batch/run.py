@@ -37,7 +37,7 @@ from ferryid.batch.task import DONE, STATUSES, Task, lost, work
 from ferryid.batch.trend import trends_of
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError, one_line
-from ferryid.files import alone, dump_json, remove_abandoned, write_text
+from ferryid.files import alone, dump_json, remove_abandoned, resolved, write_text
 from ferryid.ingest import open_log
 from ferryid.ingest.hashing import content_hash
 from ferryid.models import Model, model_to_json
@@ -111,12 +111,12 @@ def batch(
     if not chosen.model:
         entries = _with_vessels(entries, tell)
     patients = _patients(entries, chosen, out)
-    folder = (out / "batch").resolve()
+    folder = resolved(out / "batch")
     with alone(folder, wait=False):
         remove_abandoned(out / "logs")
         kept = Kept(folder / "results")
         # The same for all logs, of which there may be thousands.
-        asked_for, place = _hash(dump_json(chosen.plain())), out.resolve()
+        asked_for, place = _hash(dump_json(chosen.plain())), resolved(out)
         tasks = [
             _task(entry, patients.get(entry.vessel), chosen, asked_for, limit, again, place, ranges)
             for entry in entries
@@ -135,11 +135,11 @@ def batch(
         results = [rows[number] for number in range(len(entries))]
         result = _summed_up(entries, results, already, patients, chosen, limit, out, begun)
         logs = {row.log: task.log for row, task in zip(result.rows, tasks, strict=True)}
-        groups = partial(_changes, result, logs, patients, chosen, out.resolve(), ranges, limit, processes, dask)
+        groups = partial(_changes, result, logs, patients, chosen, resolved(out), ranges, limit, processes, dask)
         result = replace(result, changes=groups(again, progress, tell), seconds=time.monotonic() - begun)
         progress("writing the summary")
         write_table(folder / "summary.parquet", table_of(result.rows))
-        interactive = make_interactive(timelines(result), folder, out.resolve())
+        interactive = make_interactive(timelines(result), folder, resolved(out))
         for file, text in interactive.files().items():
             write_text(folder / file, text)
         write_text(folder / "index.html", render(result, interactive))

@@ -143,5 +143,6 @@ def _below(row: SummaryRow, path: str | None) -> str | None:
 
 def write_table(path: Path, table: pa.Table) -> None:
     """Write a Parquet file, whole or not at all."""
-    with replacing(path) as temporary:
-        pq.write_table(table, temporary, compression="zstd")
+    # Opened here: pyarrow takes no path with bytes that are no characters.
+    with replacing(path) as temporary, temporary.open("wb") as file:
+        pq.write_table(table, file, compression="zstd")

@@ -19,6 +19,7 @@ from ferryid.diagnose.judging.campaign_split import Split, find_split
 from ferryid.diagnose.judging.diagnosis import distinct
 from ferryid.effects.wording import listed
 from ferryid.errors import FerryIdError
+from ferryid.files import resolved
 from ferryid.models import Model
 from ferryid.side_by_side import over
 from ferryid.signals.artificial import NO_RECORDING
@@ -104,7 +105,7 @@ def gather(
 
 def _resolved(path: str) -> tuple[str, ...]:
     """Return what a path leads to, part by part."""
-    return tuple(str(Path(part).resolve()) for part in path.split("+"))
+    return tuple(str(resolved(part)) for part in path.split("+"))
 
 
 def _copied(path: str, other: str, whose: str) -> str:

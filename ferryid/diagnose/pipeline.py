@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path, PurePath
+from pathlib import PurePath
 
 from ferryid.diagnose.gathering import (
     Gathered,
@@ -30,6 +30,7 @@ from ferryid.diagnose.judging.model_update import store_updated_model
 from ferryid.diagnose.second_sources import compare_second_sources
 from ferryid.effects.wording import listed
 from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.files import resolved
 from ferryid.freed import give_back
 from ferryid.models import Model
 from ferryid.models.store import check_name
@@ -123,9 +124,9 @@ def _references(logs: Sequence[str], profile: Profile, settings: DiagnosisSettin
     """Return the recordings that bring the hull; read once, for all logs."""
     if not settings.reference:
         return Gathered(())
-    own = {Path(part).resolve() for log in logs for part in (log, *log.split("+"))}
+    own = {resolved(part) for log in logs for part in (log, *log.split("+"))}
     for one in settings.reference:
-        if Path(one).resolve() in own:
+        if resolved(one) in own:
             raise FerryIdError(
                 f"--reference: {one}: it is one of the logs to be diagnosed. Fix: give it as a log or as a reference"
             )

@@ -24,6 +24,7 @@ from ferryid.diagnose.judging.group_differences import (
 from ferryid.diagnose.judging.group_loads import LoadDifference
 from ferryid.diagnose.pipeline import DiagnosisSettings
 from ferryid.errors import FerryIdError
+from ferryid.files import resolved
 from ferryid.types import RunContext
 from ferryid.vessel.profile import Profile
 
@@ -145,19 +146,15 @@ def _check(logs: Sequence[str], versus: Sequence[str], settings: DiagnosisSettin
     for name, group in zip(GROUPS, (logs, versus), strict=True):
         if not group:
             raise FerryIdError(f"diagnose: group {name} has no log. Fix: give logs before --versus and after it")
-    first = {_resolved(part): part for one in logs for part in _parts(one)}
+    first = {resolved(part): part for one in logs for part in _parts(one)}
     for one in versus:
         for part in _parts(one):
-            if _resolved(part) in first:
+            if resolved(part) in first:
                 raise FerryIdError(f"{part}: stands on both sides of --versus. Fix: give each log to one side")
 
 
 def _parts(log: str) -> list[str]:
     return [log] if Path(log).exists() else log.split("+")
-
-
-def _resolved(path: str) -> Path:
-    return Path(path).resolve()
 
 
 def _group_log(log: AveragedLog) -> GroupLog:

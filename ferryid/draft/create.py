@@ -13,6 +13,7 @@ from ferryid.errors import FerryIdError
 from ferryid.files import replacing
 from ferryid.types import TimeRanges
 from ferryid.vessel.folder_settings import VESSEL_FILE, log_folder
+from ferryid.vessel.load import NAME, NAME_RULE
 from ferryid.vessel.profile import Profile
 
 Ask = Callable[[Question], str]
@@ -65,9 +66,9 @@ def new_profile(
     place = _shown(folder / VESSEL_FILE) if file is None else file
     if str(place) != "-" and place.exists() and not overwrite:
         raise FerryIdError(f"{place}: is there already. Fix: give --file another name, or --overwrite")
-    named = name or re.sub(r"[^A-Za-z0-9._-]+", "-", folder.name).strip("-._") or "vessel"
-    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", named):
-        raise FerryIdError(f'--name: cannot be "{name}". Fix: use letters, digits, ".", "-" and "_" only')
+    named = name or re.sub(r"[^A-Za-z0-9._-]+", "-", folder.name).strip("-._")[:80] or "vessel"
+    if not NAME.fullmatch(named):
+        raise FerryIdError(f'--name: cannot be "{name[:80]}". Fix: {NAME_RULE}')
     progress("reading the log")
     draft = draft_profile(log, like, ranges)
     progress("")

@@ -11,7 +11,7 @@ from ferryid.errors import FerryIdError
 from ferryid.export.formats import formats
 from ferryid.export.model_file import export_model
 from ferryid.export.sdf import SMALL, shares
-from ferryid.files import check_result
+from ferryid.files import check_result, resolved
 from ferryid.models.store import load
 from ferryid.types import TimeRanges, no_progress
 from ferryid.vessel import choose_vessel, parse_profile
@@ -117,7 +117,7 @@ def _check_lines(check: Mapping[str, Any] | None) -> list[str]:
 
 
 def _check_apart(json: Path, others: list[Path]) -> None:
-    if any(json.resolve() == one.resolve() for one in others):
+    if any(resolved(json) == resolved(one) for one in others):
         raise FerryIdError(f"{json}: cannot be the place of two files. Fix: give --json another name")
 
 

@@ -15,7 +15,7 @@ from ferryid.export.findings import diagnostics, finding_values, read_diagnosis,
 from ferryid.export.frames import BODY, WORLD, transform_streams
 from ferryid.export.layouts import check_layouts, foxglove, layout_files, plotjuggler
 from ferryid.export.model_file import SCHEMA
-from ferryid.files import replacing, write_text
+from ferryid.files import replacing, resolved, write_text
 from ferryid.models import Model
 from ferryid.models.forces import base_force
 from ferryid.models.prediction import Prediction, predict, predict_base, signal_map
@@ -157,7 +157,7 @@ def _check_place(log: str, mcap: Path, *, overwrite: bool) -> None:
     read = [Path(log)] if Path(log).exists() else [Path(part) for part in log.split("+")]
     for one in read:
         # A file more in the folder of a recording would be read as a part of it.
-        if one.is_dir() and mcap.resolve().is_relative_to(one.resolve()):
+        if one.is_dir() and resolved(mcap).is_relative_to(resolved(one)):
             raise FerryIdError(f"{mcap}: lies in the log that it is made from, {one}. Fix: give it another place")
     check_output(mcap, overwrite=overwrite, inputs=read)
     check_layouts(mcap)

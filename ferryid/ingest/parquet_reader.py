@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -59,10 +60,13 @@ def _failures() -> tuple[type[Exception], ...]:
 
 
 def _open_file(path: Path) -> Any:
+    import pyarrow as pa
     import pyarrow.parquet as parquet
 
+    # As bytes: pyarrow takes no text with bytes that are no characters.
+    name = os.fsencode(path)
     try:
-        file = parquet.ParquetFile(path, page_checksum_verification=True)
+        file = parquet.ParquetFile(pa.OSFile(name), page_checksum_verification=True)
         columns = [file.schema.column(number) for number in range(len(file.schema))]
         texts = [
             column.path for column in columns if column.logical_type.type == "STRING" and column.path == column.name
@@ -70,7 +74,7 @@ def _open_file(path: Path) -> Any:
         if not texts:
             return file
         # As dictionaries, a text that many rows have is in memory once; pyarrow cannot do so in structs of several groups.
-        return parquet.ParquetFile(path, page_checksum_verification=True, read_dictionary=texts)
+        return parquet.ParquetFile(pa.OSFile(name), page_checksum_verification=True, read_dictionary=texts)
     except _failures() as error:
         raise _damaged(path, error) from error
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError
+from ferryid.files import resolved
 from ferryid.ingest.formats.sqlite3_bag import MAGIC
 
 Job = TypeVar("Job")
@@ -78,7 +79,7 @@ class Database:
 
     def connect(self) -> sqlite3.Connection:
         """Return a connection for one thread at a time, whose statements are interrupted when they do not end."""
-        uri = f"{self.path.resolve().as_uri()}?mode=ro&immutable=1"
+        uri = f"{resolved(self.path).as_uri()}?mode=ro&immutable=1"
         connection = sqlite3.connect(uri, uri=True, check_same_thread=False, isolation_level=None)
         connection.text_factory = bytes
         # No value of a file is larger than the file.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -274,6 +275,13 @@ def unique_names(names: Sequence[str]) -> tuple[tuple[str, ...], str]:
         result.append(name)
     note = f"repeated column names are numbered: {', '.join(renamed)}" if renamed else ""
     return tuple(result), note
+
+
+def columns_named(topic: Topic, name: str) -> int:
+    """Return how many columns of a table had a name in its file: those behind the first are numbered, as its note lists."""
+    numbered = (f"{name} ({number})" for number in itertools.count(2))
+    again = itertools.takewhile(lambda one: one in topic.fields and f'"{one}"' in topic.note, numbered)
+    return (name in topic.fields) + sum(1 for _ in again)
 
 
 def numbers_from_text(texts: Column, decimal: str, *, is_time: bool = False) -> tuple[Column, int]:

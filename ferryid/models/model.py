@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ferryid import __version__
+from ferryid.counts import verb
 from ferryid.errors import FerryIdError
 from ferryid.models.scores import ModelScores
 from ferryid.models.stored_effect import (
@@ -261,6 +262,7 @@ def model_from_json(data: Mapping[str, Any], where: str) -> Model:
         )
     try:
         _check_parts(data)
+        _check_base(data, where)
         terms = tuple(str(term) for term in data["terms"])
         rows = [data["coefficients"][axis] for axis in AXES]
 
@@ -309,6 +311,29 @@ def _physics(data: Mapping[str, Any], where: str) -> dict[str, Any]:
         parts["vessel_effects"] = effects_from_json(data.get("vessel_effects", []), profile, where, vessel=True)
         parts["conditions"] = conditions_from_json(data.get("conditions", []), profile, where)
     return parts
+
+
+def _check_base(data: Mapping[str, Any], where: str) -> None:
+    """Refuse a file whose base model is not that of the profile in it, which alone counts: a change there had no effect."""
+    hull = parse_profile(str(data["profile"]), str(data["name"])).hull
+    stated = np.array(data["base"]["M"]["value"], dtype=float)
+    parts = [] if stated.shape == (3, 3) and _agree(stated, hull.M) else ["base.M"]
+    damping = data["base"]["D"]
+    parts += [
+        f"base.D.{name}"
+        for name in sorted({*damping, *hull.D})
+        if name not in hull.D or name not in damping or not _agree(float(damping[name]), hull.D[name])
+    ]
+    if parts:
+        raise FerryIdError(
+            f"{where}: {' and '.join(parts[:3])} {verb(len(parts[:3]), 'is')} not what follows from the vessel profile that "
+            "the file holds as text, and which is used. Fix: restore the file from a backup, or change a profile and fit"
+        )
+
+
+def _agree(stated: float | Floats, used: float | Floats) -> bool:
+    """Tell whether numbers are alike to rounding."""
+    return bool(np.allclose(stated, used, rtol=1e-6, atol=1e-9, equal_nan=True))
 
 
 def _check_parts(data: Mapping[str, Any]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -160,8 +160,16 @@ class ModelScores:
             split=str(data["split"]),
             split_notes=tuple(str(note) for note in data["split_notes"]),
             measure=str(data.get("measure", "force")),
-            interval=None if (ends := data.get("interval")) is None else (float(ends[0]), float(ends[1])),
+            interval=_ends(data.get("interval")),
         )
+
+
+def _ends(interval: Sequence[float] | None) -> tuple[float, float] | None:
+    """Return the ends of an interval of a model file; ValueError where there are not two."""
+    if interval is None:
+        return None
+    low, high = interval
+    return float(low), float(high)
 
 
 def usable_rows(motion: Motion, *estimates: Floats) -> Flags:

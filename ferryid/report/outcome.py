@@ -7,6 +7,8 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ferryid.files import resolved
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -62,6 +64,6 @@ class Report(Outcome):
         if not self.report.is_file():
             return super()._repr_html_()
         if self.report.stat().st_size > LARGEST_SHOWN:
-            return f"{super()._repr_html_()}<p><a href='{escape(self.report.resolve().as_uri())}'>report</a></p>"
+            return f"{super()._repr_html_()}<p><a href='{escape(resolved(self.report).as_uri())}'>report</a></p>"
         page = escape(self.report.read_text(encoding="utf-8"))
         return f'<iframe srcdoc="{page}" style="width: 100%; height: 40em; border: 1px solid #ccc"></iframe>'

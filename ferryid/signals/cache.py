@@ -11,7 +11,7 @@ from typing import Any
 
 from ferryid import __version__
 from ferryid.errors import FerryIdError
-from ferryid.files import remove_abandoned, replacing, write_text
+from ferryid.files import remove_abandoned, replacing, resolved, write_text
 from ferryid.ingest.checksum import crc32
 from ferryid.ingest.clocks import ClockReport
 from ferryid.ingest.log import Loss, Topic
@@ -40,7 +40,7 @@ def signatures(paths: Sequence[Path]) -> list[list[Any]]:
     result: list[list[Any]] = []
     for path in paths:
         state = path.stat()
-        result.append([str(path.resolve()), state.st_size, state.st_mtime_ns, state.st_ino])
+        result.append([str(resolved(path)), state.st_size, state.st_mtime_ns, state.st_ino])
     return result
 
 

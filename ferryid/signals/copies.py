@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from ferryid.cached import cached_property
 from ferryid.errors import FerryIdError
+from ferryid.files import resolved
 from ferryid.signals.stream import Recording
 from ferryid.signals.thresholds import SIGNALS
 from ferryid.types import Floats, Ints
@@ -63,7 +63,7 @@ class GivenLogs:
                     f"{name}: holds the recording of {other}, or a piece of it, which would count twice. "
                     "Fix: give one of the two"
                 )
-        files = {str(Path(file).resolve()) for file in recording.files}
+        files = {str(resolved(file)) for file in recording.files}
         if shared := sorted(files & self._files):
             raise GivenTwiceError(f"{shared[0]}: is part of two logs, so that it would count twice. Fix: give it once")
         self._known.append((name, recording.sha256, samples))

@@ -75,16 +75,18 @@ def write_table(path: Path, columns: Mapping[str, NDArray[Any]], metadata: Mappi
         fields.append(pa.field(name, kind, nullable=False, metadata={"unit": unit_of(name)}))
         encodings[name] = "DELTA_BINARY_PACKED" if values.dtype.kind == "i" else "BYTE_STREAM_SPLIT"
     schema = pa.schema(fields, metadata={METADATA_KEY: json.dumps(metadata, sort_keys=True).encode()})
-    parquet.write_table(
-        pa.Table.from_arrays(arrays, schema=schema),
-        path,
-        compression="zstd",
-        compression_level=1,
-        use_dictionary=False,
-        column_encoding=encodings,
-        write_statistics=False,
-        write_page_checksum=True,
-    )
+    # Opened here: pyarrow takes no path with bytes that are no characters.
+    with path.open("wb") as file:
+        parquet.write_table(
+            pa.Table.from_arrays(arrays, schema=schema),
+            file,
+            compression="zstd",
+            compression_level=1,
+            use_dictionary=False,
+            column_encoding=encodings,
+            write_statistics=False,
+            write_page_checksum=True,
+        )
 
 
 def table_checksum(path: Path) -> int:

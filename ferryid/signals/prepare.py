@@ -77,6 +77,7 @@ def doubts_of(recording: Recording, track: Track, *, origin: bool = True) -> tup
         *(doubt.says for doubt in track.doubts),
         *(repair for repair in track.repairs if repair == SWAY_NOT_MEASURED),
         *recording.orders_for_feedback,
+        *recording.repeated_columns,
         *_overlap(recording, track),
         *(f"{name} is mapped and has no value in this log." for name in empty),
     )

@@ -12,6 +12,7 @@ import numpy as np
 
 from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError
+from ferryid.files import resolved
 from ferryid.ingest import log_suffixes, open_log
 from ferryid.ingest.clocks import ClockReport, Rows, repair_all
 from ferryid.ingest.hashing import content_hash
@@ -135,7 +136,7 @@ def make_recording(
     FerryIdError
         Where no mapped topic has a row, or a field is not what the profile says.
     """
-    wanted = [(topic, where) for topic in selection.wanted for where in _choices(profile, topic)]
+    wanted = [(topic, where) for topic in selection.wanted for where in _choices(profile, topic, selection)]
     converted = of_each(
         lambda one: _stream(profile, series[one[0]], *repaired[one[0]], one[1]),
         wanted,
@@ -164,10 +165,19 @@ def make_recording(
     return without_empty(whole, profile, "", "correct where in the signal map") if chosen else whole
 
 
-def _choices(profile: Profile, topic: str) -> list[tuple[tuple[str, float], ...]]:
-    """Return by what the messages of a topic are chosen, each once; that they are not is one of it."""
+def _choices(profile: Profile, topic: str, selection: Selection) -> list[tuple[tuple[str, float], ...]]:
+    """Return by what the messages of a topic are chosen, each once; that they are not is one of it.
+
+    A choice by a field that the topic does not have belongs to signals that are missing: it was not decoded.
+    """
     bare = topic.strip("/")
-    return list(dict.fromkeys(signal.where for signal in profile.signals if signal.topic.strip("/") == bare))
+    return list(
+        dict.fromkeys(
+            signal.where
+            for signal in profile.signals
+            if signal.topic.strip("/") == bare and signal.quantity not in selection.missing
+        )
+    )
 
 
 def _stream(
@@ -215,7 +225,7 @@ def log_name(path: str | Path) -> str:
     """Name of a log for folders and reports: file or folder name without suffixes, parts counted."""
     text = str(path)
     first, _, more = text.partition("+") if not Path(text).exists() else (text, "", "")
-    file = Path(first).resolve()
+    file = resolved(first)
     stem = file.stem if file.suffix in {Path(f"_{suffix}").suffix for suffix in log_suffixes()} else file.name
     clean = re.sub(r"[^A-Za-z0-9._-]+", "_", stem).strip("._") or "log"
     return f"{clean}-and-{more.count('+') + 1}-more" if more else clean

@@ -9,6 +9,7 @@ import numpy as np
 
 from ferryid.ingest.clocks import ClockReport
 from ferryid.ingest.log import Loss, Topic
+from ferryid.ingest.tables import columns_named
 from ferryid.types import Floats, Nanoseconds
 from ferryid.vessel.thrusters import ROLE_PREFIX
 
@@ -90,6 +91,17 @@ class Recording:
                     "lag stays in the residual."
                 )
         return tuple(sentences)
+
+    @property
+    def repeated_columns(self) -> tuple[str, ...]:
+        """Sentences on mapped columns of a table of which its file has several by that name."""
+        tables = {topic.name: topic for topic in self.topics if topic.encoding == "table"}
+        mapped = [found.partition(": ") for found in self.found.values()]
+        columns = {(table, name) for table, _, names in mapped if table in tables for name in names.split(", ")}
+        several = {name: columns_named(tables[table], name) for table, name in sorted(columns)}
+        return tuple(
+            f'{count} columns are named "{name}": the first is used.' for name, count in several.items() if count > 1
+        )
 
     @property
     def start_ns(self) -> int:

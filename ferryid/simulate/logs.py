@@ -111,4 +111,6 @@ def _write_truth(simulation: Simulation, path: Path) -> None:
         "start_ns": str(simulation.scenario.start_ns),
         "toml": simulation.scenario.text,
     }
-    pq.write_table(table.replace_schema_metadata(metadata), path)
+    # Opened here: pyarrow takes no path with bytes that are no characters.
+    with path.open("wb") as file:
+        pq.write_table(table.replace_schema_metadata(metadata), file)

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from ferryid.errors import FerryIdError, did_you_mean
-from ferryid.files import check_result, taken, unwritable
+from ferryid.files import check_result, resolved, taken, unwritable
 from ferryid.ingest import log_suffixes
 from ferryid.ingest.formats.rosbag2 import NAME
 
@@ -87,15 +87,15 @@ def _check_apart(asked: dict[str, Path], inputs: list[Path]) -> None:
     """Refuse two outputs in one place, one inside the other, and an output in the place of an input."""
     places = list(asked.items())
     for index, (what, path) in enumerate(places):
-        here = path.resolve()
+        here = resolved(path)
         for other, another in places[:index]:
-            there = another.resolve()
+            there = resolved(another)
             if here == there:
                 raise FerryIdError(f"{path}: {other} and {what} cannot be the same file. Fix: give one another name")
             if here.is_relative_to(there) or there.is_relative_to(here):
                 raise FerryIdError(f"{path}: {other} and {what} cannot lie in each other. Fix: give one another name")
         for one in inputs:
-            if one.resolve().is_relative_to(here) or (path.exists() and one.exists() and one.samefile(path)):
+            if resolved(one).is_relative_to(here) or (path.exists() and one.exists() and one.samefile(path)):
                 raise FerryIdError(
                     f"{path}: the {what.removeprefix('--')} cannot take the place of what it is made from, {one}. "
                     "Fix: give it another name"

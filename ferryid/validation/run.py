@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 from ferryid import __version__
 from ferryid.batch.spread import Spread, spread
 from ferryid.errors import FerryIdError
-from ferryid.files import alone, dump_json, finite, write_text
+from ferryid.files import alone, dump_json, finite, resolved, write_text
 from ferryid.json_record import Record
 from ferryid.validation.case import Case
 from ferryid.validation.checkpoint import discard, run_stage
@@ -84,7 +84,7 @@ def run_validation(
     seed = _checked_seed(seed)
     cases = pipeline.draw(seed, runs, only)
     settings = {"runs": runs, "only": list(only), **pipeline.recordings}
-    path = (out / pipeline.folder).resolve()
+    path = resolved(out / pipeline.folder)
     for line in pipeline.remarks():
         announce(line)
     announce(f"seed {seed}; if interrupted, go on with: {_resume_command(seed, runs, only, out, pipeline.recordings)}")

@@ -17,6 +17,7 @@ from types import TracebackType
 from typing import Any
 
 from ferryid.errors import FerryIdError, UnwritableError
+from ferryid.files import resolved
 from ferryid.validation.records import Diagnosis
 from ferryid.validation.worker import UNWRITABLE
 
@@ -39,7 +40,7 @@ class WorkerClient:
     """
 
     def __init__(self, folder: Path, program: Sequence[str] = PROGRAM) -> None:
-        self._folder = folder.resolve()
+        self._folder = resolved(folder)
         self._program = tuple(program)
         self._process: subprocess.Popen[bytes] | None = None
         self._temporary = ""
@@ -64,10 +65,10 @@ class WorkerClient:
         """
         out.mkdir(parents=True, exist_ok=True)
         request = {
-            "log": str(log.resolve()),
-            "profile": str(profile.resolve()),
-            "out": str(out.resolve()),
-            "more": [str(path.resolve()) for path in more],
+            "log": str(resolved(log)),
+            "profile": str(resolved(profile)),
+            "out": str(resolved(out)),
+            "more": [str(resolved(path)) for path in more],
         }
         start = time.perf_counter()
         for _ in range(TRIES):

@@ -23,6 +23,9 @@ from ferryid.vessel.profile import SETTINGS, Profile
 from ferryid.vessel.toml_lines import key_lines, too_deep
 
 SCHEMA = "ferryid.vessel/1"
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,79}")
+"""The name of a vessel: models are stored under it, so that it is no longer than theirs."""
+NAME_RULE = 'use up to 80 letters, digits, ".", "-" and "_" only'
 SHORTEST_WINDOW_S, LONGEST_WINDOW_S = 0.2, 120.0
 """What windows may be set to [s]: a few rows of a fast log, and the windows of a ship of a kilometre."""
 
@@ -168,8 +171,9 @@ def _parse(text: str, where: str) -> tuple[Profile | None, list[Fault]]:
             "schema",
         )
     name = top.text("name", required=True)
-    if name and not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", name):
-        top.fault(f'"name" cannot be "{name}". Fix: use letters, digits, ".", "-" and "_" only', "name")
+    # Of a name that is missing, or no text, that is said already.
+    if top.data.get("name") == name and not NAME.fullmatch(name):
+        top.fault(f'"name" cannot be "{name[:80]}". Fix: {NAME_RULE}', "name")
     title = top.text("title", default=name)
     source = top.text("source", required=True)
     setting = top.text("setting", options=SETTINGS)

@@ -55,7 +55,7 @@ def with_curve(top: TableReader) -> frozenset[str]:
 
 def _actuator(reader: TableReader) -> Actuator:
     name = reader.text("name", required=True)
-    if name and not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
+    if reader.data.get("name") == name and not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
         reader.fault(
             f'an actuator cannot be named "{name}": its name becomes part of column names. Fix: use letters, '
             "digits and underscores",

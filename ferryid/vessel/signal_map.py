@@ -21,6 +21,7 @@ from ferryid.errors import FerryIdError, did_you_mean, ended
 from ferryid.ingest.log import Loss, Series, Topic
 from ferryid.types import Floats
 from ferryid.vessel.elements import TEXT_TYPES, array_fault, element_fields, has_element, picked
+from ferryid.vessel.field_words import nearest_field
 from ferryid.vessel.frames import heading_from_enu, local_north_east, yaw_of_quaternion
 from ferryid.vessel.profile import Profile, Signal
 from ferryid.vessel.pulses import share_of_pulse
@@ -381,7 +382,7 @@ def _fault(signal: Signal, topic: Topic | None, topics: Sequence[Topic], losses:
         if kind is None:
             return (
                 f'found no field "{path}" in {topic.name} (it has {_some(list(topic.fields)) or "no readable definition"}).'
-                f"{did_you_mean(path, topic.fields)}"
+                f"{nearest_field(path, topic.fields)}"
             )
         if kind in TEXT_TYPES:
             return f'found text ("{kind}") in the field {path} of {topic.name}, where a number is needed'

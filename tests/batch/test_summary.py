@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import sys
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -46,6 +48,13 @@ def test_columns(tmp_path: Path) -> None:
     assert (a["mse_diagnosed_before.sway"], a["mse_diagnosed_after.sway"]) == (4.0, 1.0)
     assert (a["seconds"], c["seconds"]) == (5.5, 0.0)
     assert (c["status"], c["reason"], c["bytes"]) == ("refused", "empty", 0)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems take no such name")
+def test_a_folder_whose_name_holds_bytes_that_are_no_characters(tmp_path: Path) -> None:
+    path = tmp_path / os.fsdecode(b"o\xff") / "s.parquet"
+    write_table(path, table_of([]))
+    assert path.is_file()
 
 
 def test_where_nothing_came_of_any_log() -> None:

@@ -260,6 +260,62 @@ def test_a_folder_in_the_place_of_a_json_result(ferryid, fixtures: Path, tmp_pat
         refused(ferryid(*command, "--json", tmp_path), f"{tmp_path}: is a folder, and a file was to be written")
 
 
+@pytest.fixture
+def circle(tmp_path: Path) -> Path:
+    """Give a link that leads to another one, which leads back to it."""
+    (tmp_path / "one").symlink_to(tmp_path / "other")
+    (tmp_path / "other").symlink_to(tmp_path / "one")
+    return tmp_path / "one"
+
+
+@pytest.mark.parametrize("command", ["inspect", "fit", "ingest", "batch"])
+def test_links_that_lead_round_in_a_circle_are_no_log(ferryid, tmp_path: Path, circle: Path, command: str) -> None:
+    options = () if command == "inspect" else ("--out", tmp_path / "out")
+    refused(ferryid(command, circle, "--vessel", "milliampere", *options), str(circle))
+
+
+def test_links_that_lead_round_in_a_circle_are_no_place_for_a_result(
+    ferryid, fixtures: Path, tmp_path: Path, circle: Path
+) -> None:
+    fit = ("fit", fixtures / "short.mcap", "--vessel", "milliampere", "--out", tmp_path / "out")
+    simulate = ("simulate", fixtures / "short.toml", "--out", tmp_path / "out")
+    refused(ferryid(*fit, "--json", circle), f"{circle}: is a link that leads round in a circle", "--json another name")
+    refused(ferryid(*fit, "--json", circle / "x.json"), f"{circle}: is a link to nothing", "--json")
+    refused(ferryid(*simulate, "--log", circle / "x.mcap"), f"{circle} is no folder")
+    refused(ferryid(*simulate, "--log", circle.with_name("x.mcap"), "--json", circle), str(circle))
+    assert not (tmp_path / "out").exists()
+    assert circle.is_symlink()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems take no such name")
+def test_places_whose_names_hold_bytes_that_are_no_characters(ferryid, fixtures: Path, tmp_path: Path) -> None:
+    out = tmp_path / os.fsdecode(b"o\xff")
+    run = ferryid("ingest", fixtures / "short.mcap", "--vessel", "milliampere", "--out", out)
+    assert run.code == 0, run.err
+    assert list(out.rglob("*.parquet"))
+    truth = tmp_path / os.fsdecode(b"t\xff.parquet")
+    run = ferryid("simulate", fixtures / "short.toml", "--out", out, "--truth", truth)
+    assert run.code == 0, run.err
+    run = ferryid("inspect", truth)
+    assert run.code == 0, run.err
+
+
+@pytest.mark.parametrize("words", [["--version"], ["--help"]], ids=" ".join)
+@pytest.mark.parametrize("buffered", [True, False])
+def test_a_full_standard_output(words: list[str], buffered: bool) -> None:
+    if not os.path.exists("/dev/full"):
+        pytest.skip("no /dev/full on this machine")
+    python = [sys.executable, *([] if buffered else ["-u"]), "-c", "from ferryid.cli.entry import main; main()"]
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [*python, *words], stdout=full, stderr=subprocess.PIPE, text=True, check=False, env=environment
+        )
+    assert done.returncode == 2
+    assert done.stderr.startswith("ferryid: standard output: No space left on device. Fix: ")
+    assert done.stderr.count("\n") == 1
+
+
 @pytest.mark.slow
 def test_a_full_disk(ferryid, fixtures: Path, tmp_path: Path) -> None:
     if not os.path.exists("/dev/full"):
@@ -429,3 +485,15 @@ def csv_profile(tmp_path: Path) -> Path:
     path = tmp_path / "table.toml"
     path.write_text("".join(parts), encoding="utf-8")
     return path
+
+
+def test_a_mapped_column_whose_name_another_one_has(ferryid, fixtures: Path, tmp_path: Path) -> None:
+    head, *rows = (fixtures / "short.csv").read_text(encoding="utf-8").splitlines()
+    log = tmp_path / "twice.csv"
+    log.write_text("\n".join([f"{head},u [m/s]", *(f"{row},9" for row in rows)]), encoding="utf-8")
+    said = '2 columns are named "u [m/s]": the first is used.'
+    profile = csv_profile(tmp_path)
+    assert said in ferryid("inspect", log, "--vessel", profile).out
+    for _ in range(2):  # read, and then from the cache
+        assert said in ferryid("fit", log, "--vessel", profile, "--no-report", "--out", tmp_path / "out").out
+    assert "columns are named" not in ferryid("inspect", fixtures / "short.csv", "--vessel", profile).out

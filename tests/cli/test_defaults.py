@@ -73,6 +73,34 @@ def test_an_option_is_no_value_of_the_one_before_it(ferryid, log: Path, words: t
     assert sorted(log.parent.iterdir()) == before
 
 
+@pytest.mark.parametrize("name", ["--vessel", "--name", "--from", "--out", "--rate", "--json"])
+@pytest.mark.parametrize("joined", [True, False])
+def test_an_empty_value_is_none(ferryid, log: Path, name: str, joined: bool) -> None:
+    before = sorted(log.parent.iterdir())
+    run = ferryid("fit", log, *([f"{name}="] if joined else [name, ""]))
+    assert run.code == 2
+    assert run.err.startswith(
+        f"ferryid: {name}: its value is empty, as that of a shell variable that is not set. Fix: "
+    )
+    assert sorted(log.parent.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("diagnose", "LOG", "--model", ""),
+        ("sweep", "window", "LOG", "--windows", ""),
+        ("vessel", "new", "LOG", "--name", ""),
+        ("models", "--out", ""),
+    ],
+    ids=" ".join,
+)
+def test_commands_of_all_kinds_refuse_an_empty_value(ferryid, log: Path, words: tuple[str, ...]) -> None:
+    run = ferryid(*(str(log) if word == "LOG" else word for word in words))
+    assert run.code == 2
+    assert run.err.startswith(f"ferryid: {words[-2]}: its value is empty")
+
+
 def test_commands_of_a_group_refuse_it_as_well(ferryid, log: Path) -> None:
     said = ferryid("vessel", "new", log, "--like", "--out", "x.toml").err
     assert said.startswith(
@@ -112,6 +140,7 @@ def test_repeated_options_and_switches(ferryid, log: Path) -> None:
         ("[ingest]\nsigma = 1\n", 'ferryid.toml:2: "sigma" is no option of ferryid ingest.'),
         ("[ingst]\n", 'ferryid.toml:1: there is no command "ingst". Did you mean "ingest"?'),
         ("[ingest]\nverify = 3\n", "ferryid.toml:2: --verify takes true or false, found 3. Fix:"),
+        ('[ingest]\nout = ""\n', "ferryid.toml:2: --out is empty. Fix: give it a value, or remove the line"),
         ("out = true\n", "ferryid.toml:1: --out takes a text or number, found True. Fix:"),
         ('[ingest]\nvessel = "milliampere"\n', "ferryid.toml:2: the vessel is of the logs"),
         ("out = \n", "ferryid.toml: the defaults for options cannot be read"),

@@ -17,7 +17,7 @@ from ferryid.cli.plain_values import PlainCommand
 WORDS = (
     [],
     ["a", "b", "--number", "12", "--share", "0.25", "--path", "x/y", "--flag", "--name", "ü"],
-    ["--number", "-3", "--share", "1e-3", "--path", "", "--no-flag"],
+    ["--number", "-3", "--share", "1e-3", "--path", ".", "--no-flag"],
     ["--number", " 7 ", "--share", "inf"],
     ["--number", "1_000", "--share", ".5"],
     ["--number", "99999999999999999999", "--share", "nan"],

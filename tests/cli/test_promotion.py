@@ -127,6 +127,11 @@ def test_a_rejected_version_needs_a_log_that_speaks_for_it(ferryid, fixtures: Pa
         (("promote", "milliampere@7"), "no such version"),
         (("promote", "boat@1"), "no model of that name"),
         (("rollback", "boat"), "no model of that name"),
+        (("rollback",), "models rollback: the name of a model is missing. Fix: write ferryid models rollback NAME"),
+        (
+            ("promote",),
+            "models promote: the name of a model is missing. Fix: write ferryid models promote NAME@VERSION",
+        ),
         (("rollback", "milliampere@x"), "has no version"),
         (("rollback", "milliampere", "boat"), "2 names were given"),
         (("milliampere", "boat"), "write promote or rollback"),

@@ -23,6 +23,7 @@ from ferryid.errors import FerryIdError
 from ferryid.ingest import open_log
 from ferryid.ingest.log import Reader, Series, TableLayout
 from ferryid.ingest.table_time import datetimes_to_ns, guess_time, numbers_to_ns, unit_doubt
+from ferryid.ingest.tables import columns_named
 
 
 def write(folder: Path, name: str, content: str | bytes) -> Path:
@@ -99,6 +100,12 @@ def test_repeated_and_missing_names_are_numbered(tmp_path: Path) -> None:
     assert series.columns["u (2)"].tolist() == [2, 4]
     assert series.columns["column 1"].tolist() == [0, 1]
     assert "repeated column names" in reader.topics[0].note
+    assert [columns_named(reader.topics[0], name) for name in ("u", "time", "none")] == [2, 1, 0]
+
+
+def test_a_name_that_ends_in_a_number_is_no_repeated_one(tmp_path: Path) -> None:
+    _, reader = read_all(write(tmp_path, "log.csv", "time,u,u (2)\n0,1,2\n0.1,3,4\n"))
+    assert columns_named(reader.topics[0], "u") == 1
 
 
 def test_missing_cells_are_nan_and_booleans_are_kept(tmp_path: Path) -> None:

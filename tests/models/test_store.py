@@ -143,6 +143,15 @@ def test_a_wrong_reference_is_told(tmp_path: Path, reference: str, told: str) ->
         (lambda data: data.update(schema="ferryid.model/0"), "not a ferryid model"),
         (lambda data: data["coefficients"]["yaw"]["u"].update(value=10**400), "missing or wrong"),
         (lambda data: data["coefficients"]["yaw"]["u"].update(value=float("inf")), "not finite"),
+        (
+            lambda data: data["base"]["D"].update(X_u=-500.0),
+            r"base\.D\.X_u is not what follows from the vessel profile",
+        ),
+        (lambda data: data["base"]["D"].pop("X_u"), r"base\.D\.X_u is not what follows"),
+        (lambda data: data["base"]["M"]["value"][1].__setitem__(1, 1.0), r"base\.M is not what follows"),
+        (lambda data: data["base"]["M"].pop("value"), "missing or wrong"),
+        (lambda data: data["scores"].update(interval=[]), "missing or wrong"),
+        (lambda data: data["scores"].update(interval=[0.5]), "missing or wrong"),
     ],
 )
 def test_a_damaged_or_newer_file_is_told(tmp_path: Path, change, told: str) -> None:

@@ -113,6 +113,14 @@ def test_a_field_that_the_topic_lacks(log: Path) -> None:
         record(log, parse_profile(PROFILE.replace("{ id = 3", "{ ident = 3"), "boat.toml"))
 
 
+def test_a_signal_that_may_be_missed_is_chosen_by_a_field_that_the_topic_lacks(log: Path) -> None:
+    other = '\n[signals."left.force"]\ntopic = "/motors"\nfield = "data"\nunit = "N"\nwhere = { devise = 7 }\n'
+    found = record(log, parse_profile(PROFILE + other, "boat.toml"))
+    assert found.missing["left.force"].startswith('found no field "devise" in /motors')
+    assert found.missing["left.force"].endswith('Did you mean "device"?')
+    assert "F_left" not in found.found
+
+
 @pytest.mark.parametrize(
     ("where", "told"),
     [

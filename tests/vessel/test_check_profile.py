@@ -85,7 +85,10 @@ unit = "deg"
 CASES = {
     "newer schema": ('vessel/1"', 'vessel/9"@', "install a newer ferryid"),
     "no schema": ('schema = "ferryid.vessel/1"', "@", 'the file lacks "schema"'),
-    "name with a space": ('name = "boat"', 'name = "my boat"@', "use letters, digits"),
+    "name with a space": ('name = "boat"', 'name = "my boat"@', "use up to 80 letters, digits"),
+    "empty name": ('name = "boat"', 'name = ""@', 'cannot be "". Fix: use up to 80 letters'),
+    "long name": ('name = "boat"', f'name = "{81 * "x"}"@', "use up to 80 letters"),
+    "empty name of an actuator": ('name = "left"', 'name = ""@', 'cannot be named ""'),
     "source is no text": ('source = "made up for a test"', "source = 3@", "must be a string, found a number"),
     "unknown key": ("length_m = 5.0\nmass", "lenght_m = 5.0@\nmass", 'Did you mean "length_m"?'),
     "unknown table": ("[wind]", "[winds]@", 'unknown key "winds"'),

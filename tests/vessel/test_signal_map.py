@@ -13,6 +13,7 @@ from ferryid.errors import FerryIdError
 from ferryid.ingest.log import Series, Topic
 from ferryid.types import Floats
 from ferryid.vessel import convert, parse_profile, resolve, resolve_notes, select, survey
+from ferryid.vessel.field_words import nearest_field
 from ferryid.vessel.profile import Profile
 
 HEAD = """schema = "ferryid.vessel/1"
@@ -145,6 +146,20 @@ def test_signalling_nan_in_float32_is_a_plain_nan(bits: int) -> None:
 def test_misspelt_field_gets_a_suggestion() -> None:
     with pytest.raises(FerryIdError, match=r'no field "r" in /nav \(it has u, v, r_z\)\. Did you mean "r_z"'):
         select(profile(BODY), [topic("/nav", u="float64", v="float64", r_z="float64"), T1], "a.bag")
+
+
+@pytest.mark.parametrize(
+    ("path", "fields", "said"),
+    [
+        ("u [m/s]", ("v [m/s]", "u [kn]", "r [deg/s]"), ' Did you mean "u [kn]", with unit = "kn"?'),
+        ("u [m/s]", ("v [m/s]", "u"), ' Did you mean "u"?'),
+        ("u", ("v", "u (knots)"), ' Did you mean "u (knots)", with unit = "kn"?'),
+        ("data[1]", ("data (%)", "date[1]"), ' Did you mean "date[1]"?'),
+        ("speed", ("sped", "u [kn]"), ' Did you mean "sped"?'),
+    ],
+)
+def test_a_field_of_the_same_name_in_another_unit_comes_first(path: str, fields: tuple[str, ...], said: str) -> None:
+    assert nearest_field(path, fields) == said
 
 
 @pytest.mark.parametrize(

@@ -57,7 +57,9 @@ def _write_table(series: Series, layout: TableLayout | None, path: Path) -> None
     if layout is not None and series.stamp_ns is not None:
         columns |= dict(zip(layout.stamp, _stamps(series.stamp_ns, layout), strict=True))
     columns |= {path_: pa.array(values) for path_, values in series.columns.items() if path_ not in columns}
-    parquet.write_table(pa.table(columns), path)
+    # Opened here: pyarrow takes no path with bytes that are no characters.
+    with path.open("wb") as file:
+        parquet.write_table(pa.table(columns), file)
 
 
 def _stamps(stamp_ns: Any, layout: TableLayout) -> list[Any]:
