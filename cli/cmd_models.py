@@ -80,7 +80,7 @@ def _too_many(first: str, others: list[str]) -> str:
     what = f"models: takes the name of one model to show it, found {counted(1 + len(others), 'word')}, {first!r} first."
     if len(others) == 1 and first in ("show", "list"):
         return f"{what} Fix: write ferryid models {quote(others[0])}"
-    return f"{what} Fix: write ferryid models NAME, or promote or rollback before the name"
+    return f"{what} Fix: name one model, or write promote or rollback before it"
 
 
 def _rolled_back(names: list[str], out: Path, to: str | None) -> Outcome:

@@ -44,7 +44,7 @@ def drawn(run, out: Path) -> dict:
     ("words", "remedy"),
     [
         (("show", "nwork"), "Fix: write ferryid models nwork (docs"),
-        (("show", "a", "b"), "Fix: write ferryid models NAME, or promote or rollback before the name"),
+        (("show", "a", "b"), "Fix: name one model, or write promote or rollback before it"),
     ],
 )
 def test_words_after_models_that_are_no_name_get_the_command_that_shows_one(ferryid, words, remedy: str) -> None:
