@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from ferryid.effects import effects
-from ferryid.effects.force_model import COEFFICIENTS, UNITS, hull_of
+from ferryid.effects.force_model import COEFFICIENTS, UNITS, Measurements, hull_of, required_force
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json
 from ferryid.models.forces.estimator import hull_coefficients, model_estimator
@@ -244,3 +244,25 @@ def test_what_began_in_one_log_lasts_in_the_others() -> None:
     assert BROKEN.onset_in("cd" * 32) == 0.0
     assert diagnosed().conditions_of(HERE) == (WINDY,)
     assert diagnosed().conditions_of("cd" * 32) == ()
+
+
+def test_zeta_divides_the_force_of_a_measured_payload_too() -> None:
+    rng, n = np.random.default_rng(4), 20
+    model = replace(made(), scale={"delta": 0.8, "sigma": 1.3, "zeta": 0.9}, theta=0.0 * made().theta)
+    nu, nu_dot, psi = rng.normal(size=(n, 3)), rng.normal(size=(n, 3)), rng.uniform(-3.0, 3.0, n)
+    payload = np.column_stack([rng.uniform(0.0, 400.0, n), rng.uniform(-1.0, 1.0, n)])
+    measurements = Measurements(
+        profile=FERRY,
+        t=np.arange(float(n)),
+        eta=np.column_stack([np.zeros((n, 2)), psi]),
+        nu_raw=nu,
+        nu=nu,
+        parts=np.zeros((n, 2, 3)),
+        angles=np.zeros((n, 2)),
+        usable=np.ones(n, dtype=bool),
+        payload=payload,
+        wind=np.zeros((n, 2)),
+    )
+    found = required_force(ModelForces(model).plain(measurements), nu_dot)
+    wanted = model_estimator(model)(nu_dot, nu, psi, measurements.wind, None, payload)
+    np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-9)

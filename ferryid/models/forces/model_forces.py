@@ -81,6 +81,9 @@ class ModelForces:
         model's. The air is still where no wind was measured and the model does not say otherwise.
         """
         bare = hull_force_model(measurements, self.hull)
+        if bare.load is not None:
+            # As the hull's coefficients are, and the wind load that the estimator takes off below.
+            bare = replace(bare, load=bare.load / float(self.force.scale.get("zeta", 1.0)))
         functions = self.force.basis
         still = np.zeros((len(measurements.t), 2))
         wind, current = measurements.wind, measurements.current
