@@ -2,7 +2,6 @@
 
 from ferryid.identify.acceptance import Acceptance, accept, accept_on_motions, force_mse
 from ferryid.identify.archive import fit_archive, keep_for_archive
-from ferryid.identify.averaged_out import averaged_out
 from ferryid.identify.inputs import read_logs
 from ferryid.identify.model_selection import Selection
 from ferryid.identify.outcome import ComponentCurve, Excitation, FitOutcome, LogFit
@@ -22,7 +21,6 @@ __all__ = [
     "Selection",
     "accept",
     "accept_on_motions",
-    "averaged_out",
     "check_window",
     "fit_archive",
     "fit_logs",

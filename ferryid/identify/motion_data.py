@@ -10,7 +10,6 @@ from typing import Any, Self
 import numpy as np
 
 from ferryid.cached import cached_property
-from ferryid.identify.averaged_out import averaged_out
 from ferryid.identify.contradictions import faint_force
 from ferryid.identify.excitation import assess_excitation, still_axes, still_warnings
 from ferryid.identify.fit_data import Coefficients, Estimate, FitData
@@ -27,7 +26,7 @@ from ferryid.identify.thresholds import IDENTIFY
 from ferryid.models import ModelScores, force_scores
 from ferryid.models.forces import Estimator, compute_residual, without_inputs
 from ferryid.models.prediction import FreeRun, run_free
-from ferryid.regression import CrossProducts, QrFactor, Rows, factorise
+from ferryid.regression import CrossProducts, QrFactor, Rows, averaged_out, factorise
 from ferryid.regression.resampling import Blocks, block_seconds
 from ferryid.signals.prepare import Opened, Prepared, smoothed
 from ferryid.signals.track import Motion, segments

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from ferryid.regression.simpls import Simpls, fit_simpls, total
     from ferryid.regression.test_function import STRIDES, window_rows, window_starts, window_sums, window_weights
     from ferryid.regression.thresholds import REGRESSION
+    from ferryid.regression.window_shares import averaged_out
 
 __all__ = [
     "REGRESSION",
@@ -30,6 +31,7 @@ __all__ = [
     "QrFactor",
     "Rows",
     "Simpls",
+    "averaged_out",
     "component_covariances",
     "factorise",
     "fit_nipals",
@@ -61,6 +63,7 @@ __getattr__ = import_on_demand(
             "fit_nipals",
         ),
         "active_set": ("non_negative",),
+        "window_shares": ("averaged_out",),
         "pca": ("principal_components",),
         "qr": (
             "QrFactor",

@@ -1,4 +1,4 @@
-"""Thresholds of what rows determine, and of intervals by resampling."""
+"""Thresholds of what windows keep, of what rows determine, and of intervals by resampling."""
 
 from __future__ import annotations
 
@@ -11,6 +11,19 @@ from ferryid.thresholds import threshold
 class RegressionThresholds:
     """Regression."""
 
+    least_kept: float = threshold(
+        0.5,
+        "of the variance",
+        "what windows must keep of an axis's velocity, or of the force on it",
+        "convention: half; 0.01 and 0.00 in yaw on a boat of a metre that zigzags within two seconds, 0.6 and more on others",
+    )
+    shorter_keeps: float = threshold(
+        0.3,
+        "of the variance",
+        "what shorter windows must keep of it to be proposed",
+        "convention: of white noise at 10 Hz, windows of a second keep 0.23",
+    )
+    fewest_rows: int = threshold(8, "rows", "fewest rows of a window", "convention: below, its weight is no curve")
     condition_index: float = threshold(
         100.0,
         "-",

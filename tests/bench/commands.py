@@ -23,8 +23,8 @@ STATISTICS = ("scipy.linalg", "scipy.special")
 COMPILED = ("numpy", "numba", "typer")
 """What a simulation needs."""
 FIT_STEPS = {
-    "reading and putting on one grid": ("/identify/inputs.py:read_logs",),
-    "smoothing and residuals": ("/identify/pipeline.py:_prepare",),
+    "reading and putting on one grid": ("/identify/inputs.py:usable_logs",),
+    "smoothing and residuals": ("/identify/motion_data.py:prepared_data",),
     "forces that act the wrong way": ("/identify/force_signs.py:refuse_reversed_forces",),
     "length of the windows": ("/identify/window_length.py:with_best_length",),
     "wind and gusts of each log": ("/identify/weak_data.py:conditions",),

@@ -115,7 +115,7 @@ def test_a_fit_leaves_out_which_of_several_logs_cannot_be_used(given: Given) -> 
     assert left_out == [
         "Left out of the fit: foreign: no velocity. Fix: map it",
         "Left out of the fit: brief: log shorter than the smoothing window, found 0.50 s unbroken where 1.10 s are needed. "
-        "Fix: use a longer log or a shorter --window",
+        "Fix: give a longer log or a shorter --window",
     ]
 
 
@@ -149,7 +149,7 @@ def test_too_little_that_is_left_is_refused_with_what_was_left_out(given: Given)
     with pytest.raises(
         FerryIdError,
         match=r"^one: too short for three blocks .* are needed\. Left out of the fit: foreign: no velocity\. "
-        r"So is 1 more log\. Fix: use a longer log",
+        r"So is 1 more log\. Fix: give a longer log",
     ):
         fit_logs(paths, PROFILE, QUICK, NOWHERE)
 

@@ -12,8 +12,8 @@ from ferryid.diagnose.data.thresholds import DATA
 from ferryid.effects.force_model import Measurements
 from ferryid.effects.measurements import actuator_forces, interpolate_gaps, rudder_states
 from ferryid.errors import FerryIdError, did_you_mean
-from ferryid.identify import averaged_out
 from ferryid.models import validity_ranges
+from ferryid.regression import averaged_out
 from ferryid.signals.align import align
 from ferryid.signals.artificial import artificial
 from ferryid.signals.complementary_filter import CUBIC_S, complementary_filter

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ferryid.effects.wording import listed
-from ferryid.identify.thresholds import IDENTIFY
-from ferryid.regression import window_starts, window_sums, window_weights
+from ferryid.regression.test_function import window_starts, window_sums, window_weights
+from ferryid.regression.thresholds import REGRESSION
 from ferryid.signals.track import Motion, segments
 from ferryid.types import AXES, Flags, Floats
 from ferryid.vessel.dimensions import window_seconds
@@ -26,7 +26,7 @@ SHORTER = (0.5, 0.25)
 def averaged_out(profile: Profile, motions: Sequence[Motion]) -> tuple[str, ...]:
     """Return a sentence on the axes whose motion windows average out, with the length to state; none where there are none.
 
-    An axis counts where the windows keep less than `IDENTIFY.least_kept` of the variance of its velocity, and of that of the
+    An axis counts where the windows keep less than `REGRESSION.least_kept` of the variance of its velocity, and of that of the
     force that its actuators put on it: either alone may be noise.
 
     Parameters
@@ -38,13 +38,13 @@ def averaged_out(profile: Profile, motions: Sequence[Motion]) -> tuple[str, ...]
     """
     usual_s = window_seconds(profile)
     kept = kept_shares(motions, usual_s)
-    lost: Flags = np.max(kept, axis=0) < IDENTIFY.least_kept
+    lost: Flags = np.max(kept, axis=0) < REGRESSION.least_kept
     if not lost.any():
         return ()
     tried = {share * usual_s: kept_shares(motions, share * usual_s).min(axis=0) for share in SHORTER}
-    better = [length for length, one in tried.items() if (one[lost] >= IDENTIFY.least_kept).all()]
+    better = [length for length, one in tried.items() if (one[lost] >= REGRESSION.least_kept).all()]
     length_s = max(better, default=min(tried))
-    if np.any(tried[length_s][lost] < IDENTIFY.shorter_keeps):
+    if np.any(tried[length_s][lost] < REGRESSION.shorter_keeps):
         # What is gone in shorter ones as well is noise.
         return ()
     shares = [f"{100.0 * kept[0, k]:.0f} % in {axis}" for k, axis in enumerate(AXES) if lost[k]]
@@ -66,7 +66,7 @@ def kept_shares(motions: Sequence[Motion], length_s: float) -> Floats:
         known = motion.valid & np.isfinite(both).all(axis=1)
         m = round(length_s * motion.rate_hz)
         starts, _ = window_starts(segments(known), m)
-        if m < IDENTIFY.fewest_rows or not len(starts):
+        if m < REGRESSION.fewest_rows or not len(starts):
             continue
         weight, _, _ = window_weights(m, 1.0 / motion.rate_hz)
         means.append(window_sums(both, weight / motion.rate_hz, starts))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ferryid.identify.averaged_out import averaged_out, kept_shares
+from ferryid.regression.window_shares import averaged_out, kept_shares
 from ferryid.signals.track import Motion
 from ferryid.vessel import load_profile
 from ferryid.vessel.dimensions import window_seconds
