@@ -206,4 +206,4 @@ def test_an_unengaged_run_of_the_catamaran_is_left_out(shared_data: Callable[[st
     assert len(found.opened) == len(logs) - 2
     navigation, engaged = found.left_out
     assert "u_1_psi_ref_2021-08-16-15-07-44.bag: position is needed" in navigation
-    assert "52000_2016-02-11-10-40-10.bag: the applied forces accelerate the vessel by surge -0.0" in engaged
+    assert "52000_2016-02-11-10-40-10.bag: the applied forces accelerate the vessel by surge 0.0" in engaged

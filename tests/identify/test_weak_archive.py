@@ -125,7 +125,10 @@ def test_the_same_as_a_fit_to_the_training_rows_of_the_logs(
         assert kept.curve.chosen == rows.curve.chosen
         assert kept.winds == rows.winds
         assert len(kept.winds) == 3
-        assert kept.model.training == rows.model.training
+        # An archive keeps no samples by which copies of its logs would be known.
+        assert kept.model.training == tuple(
+            {k: v for k, v in log.items() if k != "motion"} for log in rows.model.training
+        )
         assert kept.model.settings["weak_window_s"] == rows.model.settings["weak_window_s"]
         checks = {check.name: check for check in rows.acceptance.checks}
         for check in kept.acceptance.checks:

@@ -25,6 +25,7 @@ from ferryid.effects.equations_of_motion import MASSES, damping_changes, over_gr
 from ferryid.effects.force_model import ForceModel, Measurements, as_measured, hull_changes, plainly_damped
 from ferryid.regression import window_weights
 from ferryid.types import Floats, Ints
+from ferryid.vessel.dimensions import window_seconds
 
 CHANNELS = ("north", "east", "heading", "surge", "sway", "yaw rate")
 """Where the measured acceleration comes from: second derivative of the first three, first of the others."""
@@ -167,7 +168,7 @@ class Windows:
 STEPS_A_WINDOW = 20
 FORCES_HZ, LEAST_ROWS = 5.0, 16.0
 """Rate at which forces are averaged over windows, as they change slowly against it and hypotheses cost a quarter; and fewest
-rows of forces in a window, for which the rate is higher in short ones."""
+rows of forces in a vessel's window, for which the rate is higher where that is short."""
 
 
 def windows(measurements: Measurements, length_s: float, stride_s: float) -> Windows:
@@ -176,7 +177,8 @@ def windows(measurements: Measurements, length_s: float, stride_s: float) -> Win
     The weight is ``sin^4``: it and its first three derivatives vanish at the ends. Measured motion is averaged at the full
     rate, and the measurements for the forces are thinned to `FORCES_HZ`.
     """
-    every = max(1, round(1.0 / (max(FORCES_HZ, LEAST_ROWS / length_s) * measurements.step_s)))
+    hz = max(FORCES_HZ, LEAST_ROWS / window_seconds(measurements.profile))
+    every = max(1, round(1.0 / (hz * measurements.step_s)))
     thin = _thinned(measurements, every)
     m = max(8, round(length_s / thin.step_s))
     stride = max(1, round(stride_s / thin.step_s))

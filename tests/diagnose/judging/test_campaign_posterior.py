@@ -37,7 +37,7 @@ def campaign() -> JudgedCampaign:
 
 def survey() -> Survey:
     used = UsedRows("log", 4, 2.0, {"u": (0.0, 1.0), "v": (0.0, 1.0), "r": (0.0, 1.0)}, (), ())
-    recording = SimpleNamespace(sha256="ab", files=("log.mcap",))
+    recording = SimpleNamespace(sha256="ab", files=("log.mcap",), streams={})
     return cast(Survey, SimpleNamespace(used=used, repairs=(), recording=recording))
 
 
