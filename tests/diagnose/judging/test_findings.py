@@ -146,11 +146,11 @@ def test_what_comes_and_goes_by_little_is_a_hint(
 def test_what_makes_an_axis_worse_is_a_hint(
     windy: tuple[EstimationProblem, Elimination], grown: float, sure: bool
 ) -> None:
-    """By 44 and by 10 % of the squared error in yaw, where it improves nothing elsewhere while it acts."""
+    """By 44 and by 10 % of the squared error in yaw, where it improves surge by 19 % while it acts."""
     problem, stands = windy
     assert stands.proof is not None
     (proof,) = stands.proof.proofs
-    after = proof.improvement.before * [1.0, 1.0, grown]
+    after = proof.improvement.before * [0.9, 1.0, grown]
     other = replace(proof, improvement=replace(proof.improvement, after=after))
     finding, notes = judged_by_rules(problem, replace(stands, proof=replace(stands.proof, proofs=(other,))))
     assert finding.sure == sure
