@@ -11,7 +11,7 @@ from typing import Any
 from ferryid.effects import effects
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.models import Conditions, Model, StoredEffect
-from ferryid.models.forces import UnmappedTerms, beside_the_hull, moving_coefficients, replace_hull_coefficients
+from ferryid.models.forces import UnmappedTerms, beside_the_hull, hull_coefficients, replace_hull_coefficients
 from ferryid.signals.recording import log_name
 from ferryid.simulate.check_scenario import vessel_of
 from ferryid.simulate.plant.beside import FACTORS
@@ -82,6 +82,9 @@ def sailed_by(scenario: Scenario, model: Model, conditions: str = "") -> Sailing
             'model to the controller ([controller] model = "FILE")'
         )
     chosen = _conditions(model, conditions) if conditions else None
+    if chosen is not None:
+        # A diagnosis estimates winds and loads in units of the force as it was measured.
+        terms = replace(terms, zeta=1.0)
     data = tomllib.loads(scenario.text)
     aside = [place for place in VESSEL_KEYS if _taken(data, place)]
     data, dropped = _without_vessel_effects(data)
@@ -96,7 +99,7 @@ def sailed_by(scenario: Scenario, model: Model, conditions: str = "") -> Sailing
         raise FerryIdError(f"with {', '.join(_names(stored))} of {model.label}, {error}") from error
     return Sailing(
         changed,
-        replace(own, hull=replace_hull_coefficients(own.hull, moving_coefficients(model))),
+        replace(own, hull=replace_hull_coefficients(own.hull, hull_coefficients(model))),
         tuple(f"the scenario's [{'.'.join(place)}] is set aside: the vessel is {model.label}" for place in aside),
         terms,
         "" if chosen is None else chosen.log,

@@ -6,7 +6,6 @@ from ferryid.models.forces.estimator import (
     effective_mass,
     hull_coefficients,
     model_estimator,
-    moving_coefficients,
     replace_hull_coefficients,
     without_sway_coupling,
 )
@@ -39,7 +38,6 @@ __all__ = [
     "hull_covariance",
     "model_estimator",
     "motion_force",
-    "moving_coefficients",
     "replace_hull_coefficients",
     "scale_hull",
     "unmapped_terms",

@@ -10,7 +10,7 @@ import numpy as np
 from ferryid.cached import cached_property
 from ferryid.effects.force_model import COEFFICIENTS, hull_of
 from ferryid.errors import FerryIdError
-from ferryid.models.forces.hull_terms import MAPPED, fitted_turning, hull_contribution
+from ferryid.models.forces.hull_terms import hull_contribution
 from ferryid.models.forces.residual import base_force, hull_force, scale_hull
 from ferryid.models.model import NO_BASIS, Model
 from ferryid.regression.bases import Basis, make_basis, relative_flow
@@ -119,16 +119,6 @@ def hull_coefficients(model: Model) -> Floats:
     profile = parse_profile(model.profile_text, model.name)
     base = hull_of(replace(profile, hull=scale_hull(profile.hull, model.scale)))
     return base / float(model.scale.get("zeta", 1.0)) + hull_contribution(model)[0]
-
-
-def moving_coefficients(model: Model) -> Floats:
-    """Return coefficients of a hull that with `beside_the_hull` moves as the model says, shape (26,).
-
-    The C of a hull is that of its whole M, and a model's that of its base model's: products of velocities make up for it.
-    """
-    turning = fitted_turning(model)
-    surplus = [sum(turning.get(place, 0.0) for place in MAPPED[name]) for name in COEFFICIENTS]
-    return np.asarray(hull_coefficients(model) + surplus, dtype=np.float64)
 
 
 def with_hull(model: Model, profile: Profile, hull: Floats) -> tuple[Profile, Mapping[str, float]]:

@@ -9,11 +9,8 @@ import numpy as np
 
 from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.models.model import Model
-from ferryid.regression.bases import SURGE, Term, make_basis
+from ferryid.regression.bases import Term, make_basis
 from ferryid.types import Floats
-
-_TURNING = (Term("vr", ("v", "r"), (SURGE,)), Term("rr", ("r", "r"), (SURGE,)))
-"""What turning takes in surge, which no coefficient of a hull stands for."""
 
 MAPPED: Mapping[str, tuple[tuple[str, int], ...]] = {
     "X_u": (("u", 0),),
@@ -92,49 +89,36 @@ class UnmappedTerms:
     zeta
         Factor on the measured force, (4.5): divides the loads of air, waves and payload. The hull's coefficients are
         divided already.
+    added_mass
+        m11, m22 and the mean of m23 and m32 that terms add to the hull [kg, kg, kg·m]. A model's C is that of its base model's
+        mass alone: what turning takes beside is in its terms of products of velocities.
     """
 
     functions: tuple[Term, ...]
     theta: Floats
     intercept: Floats
     zeta: float = 1.0
+    added_mass: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 def beside_the_hull(model: Model) -> UnmappedTerms:
-    """Return what a model's force has beside the hull of `moving_coefficients`: terms of `unmapped_terms`, and of turning."""
+    """Return what a model's force has beside its hull: terms of `unmapped_terms`, and no C of the mass that terms add."""
     theta, taken = model.theta.copy(), {place for places in MAPPED.values() for place in places}
     for k, term in enumerate(model.terms):
         for axis in range(3):
             if (term, axis) in taken:
                 theta[k, axis] = 0.0
+    some = np.flatnonzero(theta.any(axis=1))
     named = str(model.settings["basis"])
     functions = make_basis(named, structure=str(model.settings["structure"])).functions if model.terms else ()
-    turning = fitted_turning(model)
-    theta = np.concatenate([theta, [[-turning[one.name, SURGE], 0.0, 0.0] for one in _TURNING]])
-    some = np.flatnonzero(theta.any(axis=1))
+    m11, m22, m23, m32, _ = hull_contribution(model)[0][:5].tolist()
     return UnmappedTerms(
-        tuple((*functions, *_TURNING)[k] for k in some.tolist()),
+        tuple(functions[k] for k in some.tolist()),
         theta[some],
         model.intercept,
         float(model.scale.get("zeta", 1.0)),
+        (m11, m22, 0.5 * (m23 + m32)),
     )
-
-
-def fitted_turning(model: Model) -> Mapping[tuple[str, int], float]:
-    """Return ``C(nu) nu`` of the mass that a model's terms add, (2.8)-(2.11), as coefficients of terms on their axes.
-
-    A model's force is without it: C is that of the base model's mass alone, and what turning takes beside is in the terms of
-    products of velocities.
-    """
-    m11, m22, m23, m32, _ = hull_contribution(model)[0][:5].tolist()
-    coupling = 0.5 * (m23 + m32)
-    return {
-        ("vr", 0): -m22,
-        ("rr", 0): -coupling,
-        ("ur", 1): m11,
-        ("uv", 2): m22 - m11,
-        ("ur", 2): coupling,
-    }
 
 
 def unmapped_terms(model: Model) -> tuple[str, ...]:

@@ -29,23 +29,25 @@ class Beside(NamedTuple):
     """T terms: `factors` (T, f) are codes, `force` (T, 3) and `constant` (3,) what acts on the hull [N, N, N·m].
 
     `zeta` divides the loads of air, waves and payload, which then are in the units of the actuators' force as the hull is.
+    `added_mass` (3,), m11, m22 and m23 [kg, kg, kg·m], accelerates with the hull and has no C of its own.
     """
 
     factors: Ints
     force: Floats
     constant: Floats
     zeta: float
+    added_mass: Floats
 
 
 def beside_of(terms: UnmappedTerms | None) -> Beside:
     """Return terms for compiled code; what a motion takes, a model says, and the plant what acts on the hull."""
     if terms is None:
-        return Beside(np.zeros((0, 1), dtype=np.int64), np.zeros((0, 3)), np.zeros(3), 1.0)
+        return Beside(np.zeros((0, 1), dtype=np.int64), np.zeros((0, 3)), np.zeros(3), 1.0, np.zeros(3))
     most = max([len(one.factors) for one in terms.functions], default=1)
     factors = np.full((len(terms.functions), most), NONE, dtype=np.int64)
     for row, one in zip(factors, terms.functions, strict=True):
         row[: len(one.factors)] = [FACTORS.index(name) for name in one.factors]
-    return Beside(factors, -terms.theta, -terms.intercept, terms.zeta)
+    return Beside(factors, -terms.theta, -terms.intercept, terms.zeta, np.array(terms.added_mass))
 
 
 @borrowing

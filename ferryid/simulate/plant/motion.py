@@ -150,7 +150,8 @@ def derivative(plant: Plant, phase: int, node: int, i: int, t: float, state: Sta
     u_rw, v_rw = u - c * north - s * east, v - c * east + s * north
     blown = wind_load(plant.areas, u_rw, v_rw)
     mass = plant.phases.mass[phase]
-    C = coriolis_load(mass[0], mass[1], mass[2], u_r, v_r, r)
+    fitted = plant.beside.added_mass
+    C = coriolis_load(mass[0] - fitted[0], mass[1] - fitted[1], mass[2] - fitted[2], u_r, v_r, r)
     D = damping_load(plant.p, u_r, v_r, r)
     factor = damping_factor(plant.shallow, x, y)
     zeta = plant.beside.zeta
