@@ -14,6 +14,7 @@ from ferryid.signals.copies import has_marks
 from ferryid.signals.stream import Recording
 from ferryid.signals.time_ranges import shares_data
 from ferryid.vessel import parse_profile
+from ferryid.vessel.dimensions import window_seconds
 from ferryid.vessel.profile import Profile
 
 BASE = "base model"
@@ -109,6 +110,14 @@ def select_candidates(
                     "where that measures another force, it counts as the model's error"
                 )
     profile = vessel or profiles[0]
+    lengths = sorted({window_seconds(one) for one in profiles})
+    if vessel is None and len(lengths) > 1:
+        # Whichever model is named first, they are judged alike.
+        profile = replace(profile, window_s=lengths[-1])
+        warnings.append(
+            f"the profiles in the models average forces over {listed([f'{one:.3g}' for one in lengths])} s: the models are "
+            f"judged in windows of {lengths[-1]:.3g} s; give --vessel for others"
+        )
     candidates = [Candidate(label, model) for label, model in zip(labels, models, strict=True)]
     if vessel is None and any(_hull(own) != _hull(profile) for own in profiles):
         warnings.append("the models have different base models, so that none is listed; give --vessel for one")

@@ -240,6 +240,7 @@ def draft_text(draft: Draft, answers: Answers) -> str:
         f'source = "drafted from {_quoted(Path(draft.log).name)}'
         + (f", hull and thrust as of {like.name}" if like is not None else "")
         + '; numbers of the hull and the thrusters: state where they come from"',
+        *([f"window_s = {like.window_s:g}"] if like is not None and math.isfinite(like.window_s) else []),
         "",
         f"# Lines marked {MARK.removeprefix('# ')} are what no log shows: remove the mark and correct the number. Evidence",
         "# stands above each signal, CHECK is what is assumed. Then: ferryid vessel check, ferryid inspect, ferryid fit.",

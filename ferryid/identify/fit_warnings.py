@@ -117,7 +117,9 @@ def rest_warnings(force: Callable[[Floats], Floats], visited: Floats) -> tuple[s
     if not len(nu):
         return ()
     constant = force(np.zeros((1, 3)))[0]
-    usual = np.mean(np.abs(force(nu) - constant), axis=0)
+    # In motion along one axis alone there is no Coriolis force.
+    alone = [force(np.where(np.arange(3) == k, nu, 0.0))[:, k] - constant[k] for k in range(3)]
+    usual = np.array([float(np.mean(np.abs(one))) for one in alone])
     drives = [
         f"{-constant[k]:.3g} {'N·m' if axis == 'yaw' else 'N'} in {axis} "
         f"({100.0 * abs(constant[k]) / usual[k]:.0f} % of the mean damping)"
@@ -137,6 +139,12 @@ def free_run_warnings(base: FreeRun, new: FreeRun) -> tuple[str, ...]:
     if base.starts and not new.starts:
         return (f"The new model cannot be run free: {new.note}.",)
     warnings = []
+    lost = np.flatnonzero((new.heading_rad > IDENTIFY.useless_rad) & (new.horizons_s <= IDENTIFY.useless_s))
+    if lost.size:
+        k = int(lost[0])
+        warnings.append(
+            f"Run free for {new.horizons_s[k]:g} s the model's heading is off by {np.degrees(new.heading_rad[k]):.0f}° (rms)."
+        )
     for name, label, unit, factor in (
         ("position_m", "position", "m", 1.0),
         ("heading_rad", "heading", "deg", float(np.degrees(1.0))),

@@ -14,7 +14,7 @@ from ferryid.identify.settings import FitSettings
 from ferryid.signals.consistency import comparable
 from ferryid.signals.copies import GivenLogs
 from ferryid.signals.order_of_time import in_order
-from ferryid.signals.prepare import Opened, open_track
+from ferryid.signals.prepare import Opened, open_track, smoothed
 from ferryid.signals.stream import compact
 from ferryid.signals.usable import left_out_of, usable
 from ferryid.types import RunContext
@@ -102,8 +102,11 @@ def _response(one: Opened, profile: Profile, settings: FitSettings) -> ForceResp
     FerryIdError
         For a log that a fit cannot use, such as one shorter than the smoothing window.
     """
-    data = prepared_data(profile, settings, [one])
-    return force_response(data) if settings.estimator != "derivative" else None
+    if settings.estimator == "derivative" or settings.residual != "measured":
+        # Nothing is asked of it, but that it can be smoothed.
+        smoothed(one, settings.window_s, settings.smoother)
+        return None
+    return force_response(prepared_data(profile, settings, [one]))
 
 
 def _reader(profile: Profile, settings: FitSettings, run: RunContext, whole: bool = True) -> Callable[[str], Opened]:

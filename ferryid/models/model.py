@@ -315,7 +315,7 @@ def _physics(data: Mapping[str, Any], where: str) -> dict[str, Any]:
 
 def _check_base(data: Mapping[str, Any], where: str) -> None:
     """Refuse a file whose base model is not that of the profile in it, which alone counts: a change there had no effect."""
-    hull = parse_profile(str(data["profile"]), str(data["name"])).hull
+    hull = parse_profile(str(data["profile"]), where).hull
     stated = np.array(data["base"]["M"]["value"], dtype=float)
     parts = [] if stated.shape == (3, 3) and _agree(stated, hull.M) else ["base.M"]
     damping = data["base"]["D"]

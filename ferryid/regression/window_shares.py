@@ -16,7 +16,7 @@ from ferryid.regression.test_function import window_starts, window_sums, window_
 from ferryid.regression.thresholds import REGRESSION
 from ferryid.signals.track import Motion, segments
 from ferryid.types import AXES, Flags, Floats
-from ferryid.vessel.dimensions import window_seconds
+from ferryid.vessel.dimensions import SHORTEST_WINDOW_S, window_seconds
 from ferryid.vessel.profile import Profile
 
 SHORTER = (0.5, 0.25)
@@ -38,10 +38,15 @@ def averaged_out(profile: Profile, motions: Sequence[Motion]) -> tuple[str, ...]
     """
     usual_s = window_seconds(profile)
     kept = kept_shares(motions, usual_s)
+    # NaN, where no window fits, is neither.
     lost: Flags = np.max(kept, axis=0) < REGRESSION.least_kept
     if not lost.any():
         return ()
-    tried = {share * usual_s: kept_shares(motions, share * usual_s).min(axis=0) for share in SHORTER}
+    lengths = [share * usual_s for share in SHORTER if share * usual_s >= SHORTEST_WINDOW_S]
+    tried = {length: kept_shares(motions, length).min(axis=0) for length in lengths}
+    tried = {length: one for length, one in tried.items() if np.isfinite(one).all()}
+    if not tried:
+        return ()
     better = [length for length, one in tried.items() if (one[lost] >= REGRESSION.least_kept).all()]
     length_s = max(better, default=min(tried))
     if np.any(tried[length_s][lost] < REGRESSION.shorter_keeps):
@@ -49,7 +54,7 @@ def averaged_out(profile: Profile, motions: Sequence[Motion]) -> tuple[str, ...]
         return ()
     shares = [f"{100.0 * kept[0, k]:.0f} % in {axis}" for k, axis in enumerate(AXES) if lost[k]]
     return (
-        f"The windows of {usual_s:.3g} s over which forces are averaged are long for these manoeuvres: they keep "
+        f"The vessel's windows of {usual_s:.3g} s, over which forces are averaged, are long for these manoeuvres: they keep "
         f"{listed(shares)} of the variance of the velocity, so that little is seen of what the actuators do. In the profile, "
         f"window_s = {length_s:.2g} keeps more, for every command.",
     )
@@ -58,7 +63,7 @@ def averaged_out(profile: Profile, motions: Sequence[Motion]) -> tuple[str, ...]
 def kept_shares(motions: Sequence[Motion], length_s: float) -> Floats:
     """Return the share of the variance of velocity, and of force, that means over windows keep, by axis, shape (2, 3).
 
-    One where nothing varies, and where no window fits.
+    One where nothing varies, NaN where no window fits.
     """
     means, rows = list[Floats](), list[Floats]()
     for motion in motions:
@@ -72,6 +77,6 @@ def kept_shares(motions: Sequence[Motion], length_s: float) -> Floats:
         means.append(window_sums(both, weight / motion.rate_hz, starts))
         rows.append(both[known])
     if not rows:
-        return np.ones((2, 3))
+        return np.full((2, 3), np.nan)
     left, whole = (np.concatenate(some).var(axis=0) for some in (means, rows))
     return np.where(whole > 0.0, left / np.where(whole > 0.0, whole, 1.0), 1.0).reshape(2, 3)

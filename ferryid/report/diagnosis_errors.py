@@ -84,6 +84,7 @@ def free_run_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
                 "name": f"{name} after {horizons[k]:.3g} s [{unit}]",
                 "quantity": name,
                 "ratio": ratio.value,
+                "low": ratio.low,
                 "cells": [*(_turned(key, each / factor, _cell(each)) for each in (one, other)), _ratio(ratio)],
             }
         )
@@ -95,13 +96,15 @@ def free_run_caution(diagnosis: Diagnosis) -> str:
     if not fitted(diagnosis):
         return ""
     worse = [
-        f"{row['quantity']} ({row['ratio']:.2f} times)" for row in free_run_rows(diagnosis) if row["ratio"] > WORSE_RUN
+        f"{row['quantity']} ({row['ratio']:.2f} times)"
+        for row in free_run_rows(diagnosis)
+        if row["ratio"] > WORSE_RUN and not row["low"] <= 1.0
     ]
     if not worse:
         return ""
     return (
-        f"Free runs err more with the findings, in {listed(worse)}, whatever the force errors say: do not simulate with the "
-        "model unchecked."
+        f"Free runs err more with the findings, in {listed(worse)}, whatever the force errors say: do not simulate with them "
+        "unchecked."
     )
 
 

@@ -10,6 +10,8 @@ WATER_DENSITY = 1000.0
 BLOCK_COEFFICIENT = 0.7
 """Usual part of the box around a hull that it fills."""
 _WINDOW_S, _WINDOW_LENGTH_M = 8.0, 5.0
+SHORTEST_WINDOW_S, LONGEST_WINDOW_S = 0.2, 120.0
+"""What windows may be set to [s]: a few rows of a fast log, and the windows of a ship of a kilometre."""
 
 
 def dimensions(profile: Profile) -> tuple[float, float, float]:

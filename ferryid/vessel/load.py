@@ -15,6 +15,7 @@ from shlex import quote
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.ingest.log import TableLayout
+from ferryid.vessel.dimensions import LONGEST_WINDOW_S, SHORTEST_WINDOW_S
 from ferryid.vessel.faults import Fault, TableReader
 from ferryid.vessel.parse_actuators import parse_actuators, with_curve
 from ferryid.vessel.parse_hull import parse_hull, parse_wind
@@ -26,8 +27,6 @@ SCHEMA = "ferryid.vessel/1"
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,79}")
 """The name of a vessel: models are stored under it, so that it is no longer than theirs."""
 NAME_RULE = 'use up to 80 letters, digits, ".", "-" and "_" only'
-SHORTEST_WINDOW_S, LONGEST_WINDOW_S = 0.2, 120.0
-"""What windows may be set to [s]: a few rows of a fast log, and the windows of a ship of a kilometre."""
 
 
 def bundled() -> tuple[str, ...]:

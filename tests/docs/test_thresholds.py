@@ -66,7 +66,6 @@ NO_DECISION = {
         effects.wind COEFFICIENTS
     """,
     "rounding, overflow and division by zero": """
-        diagnose.judging.credibility NOTHING_LEFT
         diagnose.judging.free_runs DIVERGED
         effects.wind_loads LEAST
         signals.grid EXACT_S

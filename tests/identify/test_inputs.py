@@ -115,7 +115,7 @@ def test_a_fit_leaves_out_which_of_several_logs_cannot_be_used(given: Given) -> 
     assert left_out == [
         "Left out of the fit: foreign: no velocity. Fix: map it",
         "Left out of the fit: brief: log shorter than the smoothing window, found 0.50 s unbroken where 1.10 s are needed. "
-        "Fix: give a longer log or a shorter --window",
+        "Fix: use a longer log or a shorter --window",
     ]
 
 

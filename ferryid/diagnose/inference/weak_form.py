@@ -175,7 +175,8 @@ def windows(measurements: Measurements, length_s: float, stride_s: float) -> Win
     """Return windows of `length_s` every `stride_s` seconds, as many as lie wholly in measured data.
 
     The weight is ``sin^4``: it and its first three derivatives vanish at the ends. Measured motion is averaged at the full
-    rate, and the measurements for the forces are thinned to `FORCES_HZ`.
+    rate, and the measurements for the forces are thinned to `FORCES_HZ`, or
+    to `LEAST_ROWS` in a window of the vessel where that is more.
     """
     hz = max(FORCES_HZ, LEAST_ROWS / window_seconds(measurements.profile))
     every = max(1, round(1.0 / (hz * measurements.step_s)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import log
+from math import isfinite, log
 
 import numpy as np
 from scipy.special import chdtri, ndtri  # scipy.stats takes a third of a second to import
@@ -21,8 +21,6 @@ from ferryid.identify import inertia_checks
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
 
-NOTHING_LEFT = 1e-12
-"""Of a squared error, where rounding alone is left of it."""
 IN_THE_HULL = "hull_parameters"
 """The effect that is nothing but other coefficients of the hull: it becomes these."""
 
@@ -223,19 +221,22 @@ def worsened(removed: Mapping[str, float]) -> str:
 
     Physics that acts improves what it acts on, and hardly harms the rest. Its formula may be off on an axis where little of it
     acts: what counts is by how much the squared error of an axis grows beside how much those of the others shrink, each as the
-    logarithm of a ratio, so that it does not matter how much of a force an axis has.
+    logarithm of a ratio, so that it does not matter how much of a force an axis has. An axis whose squared error more than
+    doubles counts whatever the others gain.
 
     Parameters
     ----------
     removed
         Share of the held-out squared force error that a finding removes, by axis; below zero where it grows.
     """
-    worst = min(removed, key=lambda axis: removed[axis], default="")
-    if not worst or removed[worst] >= -JUDGING.worsening:
+    known = {axis: share for axis, share in removed.items() if isfinite(share)}
+    worst = min(known, key=lambda axis: known[axis], default="")
+    if not worst or known[worst] >= -JUDGING.worsening:
         return ""
-    shrinks = [-log(max(1.0 - share, NOTHING_LEFT)) for share in removed.values()]
+    # Of an axis without an error before, nothing was removed.
+    shrinks = [-log(1.0 - share) for share in known.values() if share < 1.0]
     gained, lost = (sum(max(sign * one, 0.0) for one in shrinks) for sign in (1.0, -1.0))
-    if lost <= JUDGING.worsening_over_gain * gained:
+    if known[worst] >= -JUDGING.worst_growth and lost <= JUDGING.worsening_over_gain * gained:
         return ""
     return f"it makes the held-out squared force error in {worst} {-100.0 * removed[worst]:.0f} % larger"
 

@@ -237,12 +237,15 @@ def _absent(found: Sequence[StoredEffect], diagnoses: Sequence[Diagnosis], profi
     return [
         one.log
         for one in diagnoses
-        if one.log not in {source.log for source in sources}
-        and any(
-            (least.effect, least.instance) == (effect, instance)
-            and least.value is not None
-            and size >= JUDGING.absent_multiple * least.value
-            for least in one.least_sizes
+        if one.posterior is None
+        or (
+            one.posterior.training["sha256"] not in {source.sha256 for source in sources}
+            and any(
+                (least.effect, least.instance) == (effect, instance)
+                and least.value is not None
+                and size >= JUDGING.absent_multiple * least.value
+                for least in one.least_sizes
+            )
         )
     ]
 

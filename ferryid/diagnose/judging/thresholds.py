@@ -258,6 +258,12 @@ class JudgingThresholds:
         "convention: twice as much good as harm; after cases of `ferryid prove` in which a push and a delay, found to some per "
         "cent, removed up to 99 % of one axis's error and made another's, near its noise, a third larger",
     )
+    worst_growth: float = threshold(
+        1.0,
+        "of the squared force error",
+        "growth of an axis's held-out error that no gain of the others outweighs",
+        "convention: twice the error before",
+    )
     least_removed: float = threshold(
         0.1,
         "of the squared force error",
@@ -301,7 +307,10 @@ class JudgingThresholds:
         "tuned on cases of `ferryid prove`: a gross lag and a late clock were hints; a controller's reaction explains little",
     )
     campaign_share: float = threshold(
-        0.5, "of the logs", "logs of a campaign that must show a property of the vessel", "convention: half of them"
+        0.5,
+        "of the logs",
+        "logs of a campaign that must show a property of the vessel; more, where it is of all of them",
+        "convention: half",
     )
     campaign_logs: int = threshold(
         3, "logs", "least size of a campaign in which one log can be the exception", "derived: a majority needs three"

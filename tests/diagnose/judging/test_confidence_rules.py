@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import inf, nextafter
+from math import inf, nan, nextafter
 
 import pytest
 
@@ -194,10 +194,14 @@ def test_what_makes_an_axis_worse_is_a_hint_and_the_axis_is_named() -> None:
         ({"surge": 0.3, "yaw": -0.25}, {"surge": 0.3, "yaw": -0.1}, False),
         # Over the whole log, too, as its own figures say it.
         ({"surge": 0.3, "yaw": 0.1}, {"surge": 0.3, "yaw": -0.25}, False),
-        # A quarter of one axis's error is two halvings, twice as much as one doubling of another's.
+        # A quarter of one axis's error is two halvings, twice as much as one doubling of another's, and no more is outweighed.
         ({"surge": 0.74, "yaw": -1.0}, {"surge": 0.74, "yaw": -1.0}, False),
         ({"surge": 0.76, "yaw": -1.0}, {"surge": 0.76, "yaw": -1.0}, True),
-        ({"surge": 1.0, "sway": 0.99, "yaw": -0.84}, {"surge": 1.0, "sway": 0.99, "yaw": -0.03}, True),
+        ({"surge": 0.99, "sway": 0.99, "yaw": -1.01}, {"surge": 0.99, "sway": 0.99, "yaw": -1.01}, False),
+        # Of an axis without an error, and of one that was not judged, nothing is known.
+        ({"surge": 1.0, "yaw": -0.25}, {"surge": 1.0, "yaw": -0.25}, False),
+        ({"surge": nan, "sway": 0.5, "yaw": 0.0}, {"surge": nan, "sway": 0.5, "yaw": 0.0}, True),
+        ({"surge": 0.996, "sway": 0.99, "yaw": -0.84}, {"surge": 0.99, "sway": 0.99, "yaw": -0.03}, True),
     ):
         assert stands(worse_on_an_axis, found("wind", **improvement), on("force", removed=removed)) == sure
     _, note = worse_on_an_axis(found("wind"), on("force", removed={"surge": 0.6, "yaw": -3.33}))
