@@ -37,6 +37,9 @@ def counted(number: int, noun: str) -> str:
 
 
 def per_cent(share: float) -> str:
-    """Return a share in two digits, without a power of ten from 0.01 % on: ``per_cent(0.0057)`` is "0.57 %", ``per_cent(1.0)`` "100 %"."""
+    """Return a share in two digits, without a power of ten from 0.01 % on.
+
+    ``per_cent(0.0057)`` is "0.57 %", ``per_cent(1.0)`` "100 %".
+    """
     value = float(f"{100.0 * share:.2g}")
     return f"{value:.0f} %" if abs(value) >= 10.0 else f"{value:g} %"

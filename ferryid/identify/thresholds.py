@@ -121,7 +121,7 @@ class IdentifyThresholds:
     useless_rad: float = threshold(
         0.5,
         "rad",
-        "error of the heading in the shortest free runs, of `useless_s` at most, beyond which a model is not accepted; in longer ones a warning",
+        "error of the heading in the shortest free runs beyond which a model is not accepted, and in longer ones warned of",
         "convention: 30°, another course",
     )
     useless_s: float = threshold(10.0, "s", "see `useless_rad`", "convention: the shortest manoeuvre")
