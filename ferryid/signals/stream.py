@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ferryid.counts import counted
 from ferryid.ingest.clocks import ClockReport
 from ferryid.ingest.log import Loss, Topic
 from ferryid.ingest.tables import columns_named
@@ -100,7 +101,9 @@ class Recording:
         columns = {(table, name) for table, _, names in mapped if table in tables for name in names.split(", ")}
         several = {name: columns_named(tables[table], name) for table, name in sorted(columns)}
         return tuple(
-            f'{count} columns are named "{name}": the first is used.' for name, count in several.items() if count > 1
+            f'{counted(count, "column")} are named "{name}": the first is used.'
+            for name, count in several.items()
+            if count > 1
         )
 
     @property

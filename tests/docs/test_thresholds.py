@@ -100,7 +100,8 @@ NO_DECISION = {
         diagnose.checks.kinematics DERIVATIVE_S
         diagnose.inference.autoregression ORDER
         diagnose.inference.coloured_noise ORDER PAIRS
-        diagnose.inference.weak_form STEPS_A_WINDOW FORCES_HZ
+        diagnose.inference.weak_form STEPS_A_WINDOW FORCES_HZ LEAST_ROWS
+        regression.window_shares SHORTER
         diagnose.inference.spectra WINDOW_RATIO BURST_HZ BURST_S BURST_PERIODS BANDS_HZ
         compare.replay JUDGED_S
         identify.free_run_checks JUDGED_S

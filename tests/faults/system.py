@@ -60,10 +60,6 @@ class System:
         os.open, os.fsync = self._os_open, self._os_fsync  # type: ignore[assignment]
         self._io_open = io.open
         builtins.open = io.open = self._opened  # type: ignore[assignment]
-        import pyarrow.parquet as parquet
-
-        self._write_table = parquet.write_table
-        parquet.write_table = self._table
 
     def _below(self, path: Any) -> str | None:
         if isinstance(path, int):
@@ -138,21 +134,6 @@ class System:
     def wrote(self, one: Operation) -> None:
         with self._io_open(os.path.join(self.root, one.path), "rb") as file:
             one.content = file.read()
-
-    def _table(self, table: Any, where: Any, *rest: Any, **options: Any) -> None:
-        below = self._below(where)
-        if below is None:
-            self._write_table(table, where, *rest, **options)
-            return
-        self._happens("create", below)
-
-        def half() -> None:
-            self._write_table(table, where, *rest, **options)
-            os.truncate(where, os.path.getsize(where) // 2)
-
-        one = self._happens("write", below, half=half)
-        self._write_table(table, where, *rest, **options)
-        self.wrote(one)
 
 
 class _Raw(io.FileIO):

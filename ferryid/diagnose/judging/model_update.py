@@ -234,19 +234,15 @@ def _absent(found: Sequence[StoredEffect], diagnoses: Sequence[Diagnosis], profi
     effect, instance = found[0].key
     candidate = Candidate.of(effects()[effect], instance, profile)
     size = min(size_of(candidate, np.array(list(one.values.values()))) for one in found)
+    showing = {source.sha256 for source in sources}
+    without = [one for one in diagnoses if one.posterior is None or one.posterior.training["sha256"] not in showing]
     return [
         one.log
-        for one in diagnoses
-        if one.posterior is None
-        or (
-            one.posterior.training["sha256"] not in {source.sha256 for source in sources}
-            and any(
-                (least.effect, least.instance) == (effect, instance)
-                and least.value is not None
-                and size >= JUDGING.absent_multiple * least.value
-                for least in one.least_sizes
-            )
-        )
+        for one in without
+        for least in one.least_sizes
+        if (least.effect, least.instance) == (effect, instance)
+        and least.value is not None
+        and size >= JUDGING.absent_multiple * least.value
     ]
 
 
