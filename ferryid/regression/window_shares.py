@@ -21,6 +21,8 @@ from ferryid.vessel.profile import Profile
 
 SHORTER = (0.5, 0.25)
 """Lengths that are tried instead, times the present one."""
+VARIES = 1e-20
+"""Of the squared mean: a variance below it is rounding."""
 
 
 def averaged_out(profile: Profile, motions: Sequence[Motion]) -> tuple[str, ...]:
@@ -65,7 +67,9 @@ def kept_shares(motions: Sequence[Motion], length_s: float) -> Floats:
 
     One where nothing varies, NaN where no window fits.
     """
-    means, rows = list[Floats](), list[Floats]()
+    # Number, sum and sum of squares of the means and of the rows: of many logs, no copy of their rows is kept.
+    totals = np.zeros((2, 3, 6))
+    offset = np.zeros(6)
     for motion in motions:
         both = np.hstack([motion.nu, motion.tau])
         known = motion.valid & np.isfinite(both).all(axis=1)
@@ -73,10 +77,17 @@ def kept_shares(motions: Sequence[Motion], length_s: float) -> Floats:
         starts, _ = window_starts(segments(known), m)
         if m < REGRESSION.fewest_rows or not len(starts):
             continue
+        if not totals.any():
+            offset = both[known].mean(axis=0)
         weight, _, _ = window_weights(m, 1.0 / motion.rate_hz)
-        means.append(window_sums(both, weight / motion.rate_hz, starts))
-        rows.append(both[known])
-    if not rows:
+        both -= offset
+        for total, values in zip(
+            totals, (window_sums(both, weight / motion.rate_hz, starts), both[known]), strict=True
+        ):
+            total += [np.full(6, float(len(values))), values.sum(axis=0), np.einsum("nk,nk->k", values, values)]
+    if not totals.any():
         return np.full((2, 3), np.nan)
-    left, whole = (np.concatenate(some).var(axis=0) for some in (means, rows))
-    return np.where(whole > 0.0, left / np.where(whole > 0.0, whole, 1.0), 1.0).reshape(2, 3)
+    count, sums, squares = totals.transpose(1, 0, 2)
+    left, whole = squares / count - (sums / count) ** 2
+    varies = whole > VARIES * offset**2
+    return np.where(varies, left / np.where(varies, whole, 1.0), 1.0).reshape(2, 3)

@@ -67,6 +67,7 @@ NO_DECISION = {
     """,
     "rounding, overflow and division by zero": """
         diagnose.judging.free_runs DIVERGED
+        regression.window_shares VARIES
         effects.wind_loads LEAST
         signals.grid EXACT_S
         diagnose.second_sources.comparison _SAME
