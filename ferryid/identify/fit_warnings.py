@@ -9,6 +9,7 @@ import numpy as np
 from ferryid.counts import counted, verb
 from ferryid.effects.wording import listed
 from ferryid.identify.outcome import Excitation
+from ferryid.identify.physical_checks import some_of
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.split import Split
 from ferryid.identify.thresholds import IDENTIFY
@@ -113,7 +114,7 @@ def rest_warnings(force: Callable[[Floats], Floats], visited: Floats) -> tuple[s
     visited
         Velocities of the motions, shape (n, 3).
     """
-    nu = visited[np.isfinite(visited).all(axis=1)]
+    nu = some_of(visited)
     if not len(nu):
         return ()
     constant = force(np.zeros((1, 3)))[0]

@@ -74,6 +74,12 @@ def inertia_checks(profile: Profile, mass: Floats) -> tuple[Check, ...]:
     return tuple(checks)
 
 
+def some_of(visited: Floats) -> Floats:
+    """Return the velocities that are known, at most `MOST_ROWS`, evenly spaced, shape (n, 3)."""
+    nu = visited[np.isfinite(visited).all(axis=1)]
+    return nu[:: max(1, -(-len(nu) // MOST_ROWS))]
+
+
 def damping_checks(force: Callable[[Floats], Floats], visited: Floats) -> tuple[Check, ...]:
     """Return whether the damping of a model dissipates at the velocities that the vessel had, and somewhat beyond.
 
@@ -87,8 +93,7 @@ def damping_checks(force: Callable[[Floats], Floats], visited: Floats) -> tuple[
     visited
         Velocities of the motions, shape (n, 3).
     """
-    nu = visited[np.isfinite(visited).all(axis=1)]
-    nu = nu[:: max(1, -(-len(nu) // MOST_ROWS))]
+    nu = some_of(visited)
     whole = float(np.mean(np.sum(np.abs(nu * (force(nu) - force(np.zeros((1, 3))))), axis=1))) if len(nu) else 0.0
     alone = [np.where(np.arange(3) == axis, nu, 0.0) for axis in range(3)]
     checks = []
