@@ -215,6 +215,8 @@ class Effect:
         masses and damping does the same.
     of_thrust_curve
         True where it is another shape of an actuator's thrust curve, and so may be the profile's error.
+    out_of_step
+        True where it puts force and motion out of step, as a delay does and a lag, and a controller that answers disturbances.
     of_log
         Of a condition that steadily acts on a whole log: names of the parameters that each log of a vessel has its own of; the
         others are the vessel's. Empty for what is no such condition.
@@ -266,6 +268,7 @@ class Effect:
     doubt_of_ends: Callable[[Mapping[str, tuple[float, float]]], str] = lambda ends: ""
     scales: bool = False
     of_thrust_curve: bool = False
+    out_of_step: bool = False
     of_log: tuple[str, ...] = ()
     turbulence: Turbulence | None = None
     absent_in: tuple[str, ...] = ()
@@ -293,6 +296,10 @@ class Effect:
         """Return the instances of which the measurements can show it."""
         every = () if self.excluded(measurements) else self.instances(measurements.profile)
         return tuple(one for one in every if not self.cannot_be_of(measurements, one))
+
+    def is_like(self, other: Effect) -> bool:
+        """Tell whether both formulas idealise what lies between them: shapes of a thrust curve, or a delay and a lag."""
+        return (self.of_thrust_curve and other.of_thrust_curve) or (self.out_of_step and other.out_of_step)
 
     @property
     def passing(self) -> bool:

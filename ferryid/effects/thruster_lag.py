@@ -75,6 +75,7 @@ EFFECT = Effect(
     says,
     scenario,
     vessel=True,
+    out_of_step=True,
     negligible=EFFECTS.least_lag,
     regressor=regressor,
 )

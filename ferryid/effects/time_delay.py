@@ -67,6 +67,7 @@ EFFECT = Effect(
     apply,
     says,
     scenario,
+    out_of_step=True,
     negligible=EFFECTS.least_delay,
     formula_error=EFFECTS.definition_error,
     regressor=regressor,

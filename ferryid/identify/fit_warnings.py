@@ -109,10 +109,8 @@ def rest_warnings(force: Callable[[Floats], Floats], visited: Floats) -> tuple[s
 
     Parameters
     ----------
-    force
-        Force that a constant velocity takes in still water and air, of velocities (n, 3) to (n, 3).
-    visited
-        Velocities of the motions, shape (n, 3).
+    force, visited
+        As of `ferryid.identify.physical_checks.damping_checks`.
     """
     nu = some_of(visited)
     if not len(nu):

@@ -57,8 +57,8 @@ def averaged_out(profile: Profile, motions: Sequence[Motion]) -> tuple[str, ...]
     shares = [f"{100.0 * kept[0, k]:.0f} % in {axis}" for k, axis in enumerate(AXES) if lost[k]]
     return (
         f"The vessel's windows of {usual_s:.3g} s, over which forces are averaged, are long for these manoeuvres: they keep "
-        f"{listed(shares)} of the variance of the velocity, so that little is seen of what the actuators do. In the profile, "
-        f"window_s = {length_s:.2g} keeps more, for every command.",
+        f"{listed(shares)} of the variance of the velocity, so that little is seen of what the actuators do. At the top of "
+        f"the profile, window_s = {length_s:.2g} keeps more, for every command.",
     )
 
 

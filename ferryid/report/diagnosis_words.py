@@ -297,21 +297,18 @@ def rivals(finding: Finding) -> list[str]:
     if finding.unresolved_with:
         names = listed([uncapitalised(one) for name in finding.unresolved_with for one in _meant(finding, name)], "or")
         lines.append(f"These data cannot distinguish it from {names}.")
-    # Another shape of the same thrust curve may be unresolved though the evidence is clear.
+    # What has a formula alike may be unresolved though the evidence is clear.
     alike = [
         one
         for one in finding.rivals
         if one.effect in finding.unresolved_with
         and one.instance == finding.instance
-        and one.delta_score <= -log(FAR)
-        and (known := effects().get(one.effect)) is not None
-        and known.of_thrust_curve
+        and one.delta_score <= -JUDGING.unresolved_evidence
+        and effects()[one.effect].is_like(effects()[finding.effect])
     ]
     if alike:
         shapes = listed([uncapitalised(title(one.effect, one.instance)) for one in alike])
-        lines.append(
-            f"The evidence is against {shapes}, but that explains nearly as much, and formulas of thrust are idealised."
-        )
+        lines.append(f"The evidence is against {shapes}, but that explains nearly as much, and formulas are idealised.")
     shown = sorted((one for one in finding.rivals if one not in alike), key=lambda rival: -rival.delta_score)[:RIVALS]
     near = [one for one in shown if one.delta_score > -log(FAR)]
     far = [uncapitalised(title(one.effect, one.instance)) for one in shown if one not in near]

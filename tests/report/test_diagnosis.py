@@ -402,6 +402,27 @@ def test_another_shape_of_the_thrust_curve_is_unresolved_though_the_evidence_is_
     assert "against" not in " ".join(rivals(replace(limit, unresolved_with=())))
 
 
+def test_a_delay_that_is_alike_is_not_said_to_be_far_less_likely_as_well() -> None:
+    lag = replace(
+        gain(),
+        effect="thruster_lag",
+        instance=None,
+        unresolved_with=("time_delay",),
+        rivals=(Rival("time_delay", None, -11.0), Rival("current", None, -20.0)),
+    )
+    told = rivals(lag)
+    assert told[:2] == [
+        "These data cannot distinguish it from time delay.",
+        "The evidence is against time delay, but that explains nearly as much, and formulas are idealised.",
+    ]
+    assert not any("time delay" in line for line in told[2:3])
+    # Near in evidence, it is as likely as it is said to be; and what is unresolved for another reason has no formula alike.
+    near = rivals(replace(lag, rivals=(Rival("time_delay", None, -1.0),)))
+    assert "against" not in " ".join(near)
+    other = rivals(replace(lag, unresolved_with=("hull_parameters",), rivals=(Rival("hull_parameters", None, -11.0),)))
+    assert "against" not in " ".join(other)
+
+
 def test_where_is_told_by_what_is_known_of_it() -> None:
     some = replace(wind(), intervals=((100.0, 180.0), (400.0, 460.0)), regime="all along", axes={"yaw": 1.0})
     assert where(some) == "It acts from 100 to 180 s and 400 to 460 s, and shows in yaw (100 %)."

@@ -32,8 +32,6 @@ from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.effects.force_model import ForceModel
 from ferryid.types import Floats
 
-OUT_OF_STEP = ("time_delay", "thruster_lag")
-"""Effects that a controller's answer to disturbances looks like."""
 SAME = 1e-6
 """Share of the largest spread, or of its own before its past is taken off, below which a force does not vary by itself."""
 

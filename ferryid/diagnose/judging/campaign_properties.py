@@ -15,7 +15,7 @@ from ferryid.diagnose.inference.campaign_estimation import CampaignFit
 from ferryid.diagnose.inference.campaign_model import Campaign
 from ferryid.diagnose.inference.campaign_properties import Rivals, TriedProperty, select_properties, without_property
 from ferryid.diagnose.inference.estimation import Candidate
-from ferryid.diagnose.inference.feedback import OUT_OF_STEP, Feedback, feedback_beside, joined
+from ferryid.diagnose.inference.feedback import Feedback, feedback_beside, joined
 from ferryid.diagnose.inference.force_errors import mass_of
 from ferryid.diagnose.inference.group_differences import compare_estimated, scatter_shows
 from ferryid.diagnose.inference.thresholds import INFERENCE
@@ -226,7 +226,7 @@ def tested(made: CampaignFit, candidate: Candidate, rivals: Sequence[TriedProper
         tuple(Rival(one.candidate.effect.id, one.candidate.instance, min(one.odds, 0.0)) for one in others),
         tuple(one.candidate.effect.id for one in others if alike(one.candidate, candidate, one.share)),
         _credibility(made, candidate, estimates),
-        _out_of_step(made, candidate, without) if effect.id in OUT_OF_STEP else None,
+        _out_of_step(made, candidate, without) if effect.out_of_step else None,
     )
 
 

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field, replace
 from math import inf
 
 from ferryid.counts import counted
-from ferryid.diagnose.inference.feedback import OUT_OF_STEP
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.claims import Claim, Figures, Key, LogFigures
 from ferryid.diagnose.judging.credibility import worsened
@@ -376,7 +375,9 @@ def out_of_step_beside_disturbance(finding: Finding, context: Context, threshold
     # A property of all logs removes over all of them, and is the same in each.
     removed = finding.improvement if context.own.kind == "property" else context.own.removed
     removes = max(removed.values(), default=0.0)
-    doubtful = context.log.unsteady and finding.effect in OUT_OF_STEP and not context.own.beyond_feedback
+    known = effects().get(finding.effect)
+    out_of_step = known is not None and known.out_of_step
+    doubtful = context.log.unsteady and out_of_step and not context.own.beyond_feedback
     if not doubtful or removes >= threshold:
         return finding, ""
     here = context.log.circumstances

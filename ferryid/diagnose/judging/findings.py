@@ -19,7 +19,7 @@ from ferryid.diagnose.inference.estimation import (
     rest_of,
     starting_point,
 )
-from ferryid.diagnose.inference.feedback import OUT_OF_STEP, feedback_of
+from ferryid.diagnose.inference.feedback import feedback_of
 from ferryid.diagnose.inference.folds import block_s
 from ferryid.diagnose.inference.onset_estimation import lasts_s, replace_candidate
 from ferryid.diagnose.judging.backward_elimination import Elimination
@@ -123,7 +123,7 @@ def _force_claim(
     ends = {name: (one.low, one.high) for name, one in estimates.items()}
     doubt = idle_actuators(problem, kept) or figures.doubt or candidate.effect.doubt_of_ends(ends)
     figures = replace(figures, doubt=doubt or interval_doubt(candidate.parameters, estimates, kept.covariance(i)))
-    if proof is not None and candidate.effect.id in OUT_OF_STEP:
+    if proof is not None and candidate.effect.out_of_step:
         beyond = proof.improvement.score_low > feedback_of(problem, kept).high
         figures = replace(figures, beyond_feedback=beyond)
     if not hull_known:

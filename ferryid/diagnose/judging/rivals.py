@@ -17,7 +17,6 @@ from ferryid.diagnose.inference.estimation import (
     starting_point,
     without,
 )
-from ferryid.diagnose.inference.feedback import OUT_OF_STEP
 from ferryid.diagnose.inference.onset_estimation import (
     Linearisation,
     is_brief,
@@ -112,8 +111,8 @@ def alike(one: Candidate, other: Candidate, share: float) -> bool:
     one, other, share
         As of `same_curve`.
     """
-    out_of_step = one.effect.id in OUT_OF_STEP and other.effect.id in OUT_OF_STEP
-    return same_curve(one, other, share) or (out_of_step and share >= JUDGING.alike_shapes)
+    same = one.instance == other.instance and one.effect.is_like(other.effect)
+    return same and share >= JUDGING.alike_shapes
 
 
 def redundant_shape(

@@ -13,14 +13,13 @@ if TYPE_CHECKING:
     from ferryid.regression.bases.basis import STRUCTURES, Basis, make_basis, relative_flow, with_hull_length
     from ferryid.regression.bases.crossflow_integrals import LEAST_SPEED_MPS
     from ferryid.regression.bases.forms import basis_names
-    from ferryid.regression.bases.term import CROSSFLOW_FACTORS, DIMENSIONS, SURGE, SWAY, Term
+    from ferryid.regression.bases.term import CROSSFLOW_FACTORS, DIMENSIONS, SWAY, Term
 
 __all__ = [
     "CROSSFLOW_FACTORS",
     "DIMENSIONS",
     "LEAST_SPEED_MPS",
     "STRUCTURES",
-    "SURGE",
     "SWAY",
     "Basis",
     "Term",
@@ -45,7 +44,6 @@ __getattr__ = import_on_demand(
         "term": (
             "CROSSFLOW_FACTORS",
             "DIMENSIONS",
-            "SURGE",
             "SWAY",
             "Term",
         ),
