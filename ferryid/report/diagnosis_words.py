@@ -291,6 +291,12 @@ def probability(value: float) -> str:
     return "above 0.99" if value > 0.99 else "below 0.01" if value < 0.01 else f"{value:.2f}"
 
 
+def _alike(one: str, other: str) -> bool:
+    """Tell whether two ids are of effects whose formulas are alike; what has no name has no formula."""
+    known = effects()
+    return one in known and other in known and known[one].is_like(known[other])
+
+
 def rivals(finding: Finding) -> list[str]:
     """Return what else was considered, and what would tell it apart."""
     lines = []
@@ -304,7 +310,7 @@ def rivals(finding: Finding) -> list[str]:
         if one.effect in finding.unresolved_with
         and one.instance == finding.instance
         and one.delta_score <= -JUDGING.unresolved_evidence
-        and effects()[one.effect].is_like(effects()[finding.effect])
+        and _alike(one.effect, finding.effect)
     ]
     if alike:
         shapes = listed([uncapitalised(title(one.effect, one.instance)) for one in alike])
