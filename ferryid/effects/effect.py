@@ -148,6 +148,9 @@ class Effect:
     step
         The same effect as a step from a level that is not known, its second parameter: of a vessel without a hull model, on
         which masses and damping that are off look like another level. None where there is no such form.
+    by_level
+        The same effect as a function of how hard its actuator works, in place of a step. What sets in when an actuator is set
+        to another level, and ends when it is set back, may be either. None where there is no such form.
     impulse
         ``impulse(force_model, p)`` returns the momentum that an effect gives the vessel if it begins in a row
         [N·s, N·s, N·m·s], shape (n, 3). What ends leaves the velocity as it is.
@@ -245,6 +248,7 @@ class Effect:
     longest_s: float = inf
     otherwise: Callable[[ForceModel, Floats, str | None], ForceModel] | None = None
     step: Effect | None = None
+    by_level: Effect | None = None
     impulse: Callable[[ForceModel, Floats], Floats] | None = None
     vessel: bool = False
     choose: Callable[[ForceModel, Floats, Residual], Choice] | None = None

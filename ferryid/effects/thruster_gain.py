@@ -11,6 +11,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from ferryid.effects.effect import Effect, Parameter, Values, span
 from ferryid.effects.force_model import ForceModel
 from ferryid.effects.thresholds import EFFECTS
@@ -18,6 +20,9 @@ from ferryid.types import AXES, Floats
 from ferryid.vessel.hull import current_in_body
 from ferryid.vessel.profile import Profile
 from ferryid.vessel.thrusters import force_at, rudder_behind
+
+LEAST_LEVEL = 1e-3
+"""Share of the usual thrust below which it is taken as that share."""
 
 
 def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
@@ -41,6 +46,26 @@ def otherwise(force_model: ForceModel, p: Floats, instance: str | None) -> Force
     return apply(force_model, p[1:], instance)
 
 
+def parameters_by_level(profile: Profile) -> tuple[Parameter, ...]:
+    """Return the factor at the usual thrust, and the power of the thrust that multiplies it."""
+    return *parameters_of(profile), Parameter("power", "-", 0.3, -1.0, 1.0)
+
+
+def apply_by_level(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+    """Multiply the thrust of the thruster by a power of it: a curve that rises faster or more slowly than the profile's."""
+    measurements = force_model.measurements
+    k = measurements.names.index(str(instance))
+    thrust = np.hypot(*force_model.parts[:, k, :2].T)
+    if measurements.rudders is not None and measurements.profile.actuators[k].rudder:
+        thrust = measurements.rudders[:, k, 0]
+    usual = float(np.sqrt(np.mean(thrust[measurements.usable] ** 2)))
+    if usual == 0.0:
+        return _multiplied(force_model, p[0], k)
+    # Of no thrust a power below zero has no value, and nothing comes of it either way.
+    level = np.maximum(np.abs(thrust) / usual, LEAST_LEVEL)
+    return _multiplied(force_model, p[0] * level ** p[1], k)
+
+
 def instances(profile: Profile) -> tuple[str | None, ...]:
     """Return the actuators."""
     return tuple(actuator.name for actuator in profile.actuators)
@@ -48,18 +73,22 @@ def instances(profile: Profile) -> tuple[str | None, ...]:
 
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Multiply the thrust of the thruster."""
+    return _multiplied(force_model, p[0], force_model.measurements.names.index(str(instance)))
+
+
+def _multiplied(force_model: ForceModel, factor: Floats, k: int) -> ForceModel:
+    """Return a force model with the thrust of one of its actuators multiplied by a factor, one for all rows or shape (n,)."""
     measurements = force_model.measurements
-    k = measurements.names.index(str(instance))
     parts, actuator = force_model.parts.copy(), measurements.profile.actuators[k]
     if measurements.rudders is None or not actuator.rudder:
-        parts[:, k] *= p[0]
+        parts[:, k] *= np.reshape(factor, (-1, 1))
         return replace(force_model, parts=parts)
     thrust, helm = measurements.rudders[:, k].T
     flow = 0.0 if measurements.current is None else current_in_body(measurements.current, measurements.psi)
     nu = measurements.nu - flow
     kept = 1.0 - actuator.inflow.get("thrust_deduction", 0.0)
-    ahead = force_at(actuator, (p[0] - 1.0) * kept * thrust, actuator.angle_rad)
-    steered = rudder_behind(actuator, helm, p[0] * thrust, nu) - rudder_behind(actuator, helm, thrust, nu)
+    ahead = force_at(actuator, (factor - 1.0) * kept * thrust, actuator.angle_rad)
+    steered = rudder_behind(actuator, helm, factor * thrust, nu) - rudder_behind(actuator, helm, thrust, nu)
     parts[:, k] += actuator.count * (ahead + steered)
     return replace(force_model, parts=parts)
 
@@ -99,4 +128,6 @@ GAIN = Effect(
     passing_size=lambda profile: EFFECTS.passing_gain,
     by_row=True,
 )
-EFFECT = replace(GAIN, step=replace(GAIN, parameters_of=parameters_of_step, apply=apply_step, otherwise=otherwise))
+BY_LEVEL = replace(GAIN, parameters_of=parameters_by_level, apply=apply_by_level, onset=False)
+STEP = replace(GAIN, parameters_of=parameters_of_step, apply=apply_step, otherwise=otherwise, by_level=BY_LEVEL)
+EFFECT = replace(GAIN, step=STEP, by_level=BY_LEVEL)

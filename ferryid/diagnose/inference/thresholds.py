@@ -194,6 +194,12 @@ class InferenceThresholds:
         "shortest span of an effect that only passes, such as a push",
         "convention: half a held-out block, 20 s for a vessel of 5 m; a position that is off for a moment looks alike",
     )
+    formula_scatter: float = threshold(
+        0.2,
+        "of each coefficient of the hull",
+        "by which it may differ in some of a log's manoeuvres, as a standard deviation",
+        "tuned on real recordings: parts of one log with circles, zigzags and two speeds",
+    )
     contrast: float = threshold(
         4.0,
         "times the log evidence elsewhere in the log",

@@ -226,6 +226,19 @@ def worse_on_an_axis(finding: Finding, context: Context, _threshold: float) -> O
     return _because(finding, why) if why else (finding, "")
 
 
+@rule(JUDGING.worse_runs, "of position, heading, speed and yaw rate")
+def worse_in_free_runs(finding: Finding, context: Context, threshold: float) -> Outcome:
+    """Lower a force with which free runs err more in as many quantities as this, whatever the force errors say.
+
+    Force errors are means over windows; what is wrong on average over a manoeuvre adds up in a free run.
+    """
+    if context.own.kind != "force" or context.own.worse_runs < threshold:
+        return finding, ""
+    return _because(
+        finding, f"free runs err more with it in {context.own.worse_runs} of position, heading, speed and yaw rate"
+    )
+
+
 @rule(JUDGING.worsening, "of the held-out squared force error")
 def worse_altogether(finding: Finding, context: Context, threshold: float) -> Outcome:
     """Lower all forces of a log in which, with all of them, every axis is worse by more than this: one is judged beside all."""
@@ -466,6 +479,7 @@ RULES: tuple[ConfidenceRule, ...] = (
     place_visited_once,
     passes_by_little,
     worse_on_an_axis,
+    worse_in_free_runs,
     worse_altogether,
     removes_little,
     less_than_is_unexplained,

@@ -177,6 +177,7 @@ def _lower_ends(proof: Proof) -> dict[str, Any]:
         "score": proof.improvement.score,
         "force_low": dict(zip(AXES, proof.improvement.low.tolist(), strict=True)),
         "free_run_low": dict(zip(AXES, runs.tolist(), strict=True)),
+        "worse_runs": proof.free_runs.worse,
     }
 
 

@@ -11,6 +11,7 @@ from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted
 from ferryid.diagnose.inference.folds import Folds, by_block, draws
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.force_model import Measurements
 from ferryid.effects.free_motion import run_freely
 from ferryid.types import Floats, Ints
@@ -42,6 +43,18 @@ class FreeRuns:
     low: Floats
     high: Floats
     starts: int
+
+    @property
+    def worse(self) -> int:
+        """In how many of the four errors grow by more than `JUDGING.worse_run`, and by more than chance.
+
+        Over the longest horizon that has data.
+        """
+        known = np.flatnonzero(np.isfinite(self.removed).any(axis=1))
+        if not known.size:
+            return 0
+        removed, high = self.removed[known[-1]], self.high[known[-1]]
+        return int(np.count_nonzero((removed < -JUDGING.worse_run) & (high < 0.0)))
 
 
 def free_runs(problem: EstimationProblem, folds: Folds, before: Sequence[Fit], after: Sequence[Fit]) -> FreeRuns:

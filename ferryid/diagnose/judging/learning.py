@@ -286,7 +286,12 @@ class Learner:
         return plain[0], left[0]
 
     def _remainder(self, base: Model) -> _Candidate:
-        outcome = fit_remainder(base, self._opened, self.profile, self.settings, self.run)
+        try:
+            outcome = fit_remainder(base, self._opened, self.profile, self.settings, self.run)
+        except ReversedForcesError as error:
+            # It is an error of the profile only where forces act the wrong way without the findings as well.
+            _ = self._plain
+            raise FerryIdError(f"with the findings, {error}") from error
         model, judged = (with_remainder(base, one) for one in (outcome.model, outcome.judged))
         return _Candidate(model, judged, _Fitted.of(outcome))
 

@@ -264,6 +264,18 @@ class JudgingThresholds:
         "growth of an axis's held-out error that no gain of the others outweighs",
         "convention: twice the error before",
     )
+    worse_run: float = threshold(
+        0.1,
+        "of the free-run error",
+        "growth of an error of free runs that counts",
+        "convention: a tenth is seen in a plot",
+    )
+    worse_runs: int = threshold(
+        2,
+        "of position, heading, speed and yaw rate",
+        "in which free runs err more with a force, from which on it is a hint",
+        "tuned on real recordings: one of four may be chance; of 65 simulated logs none loses a true name by it",
+    )
     least_removed: float = threshold(
         0.1,
         "of the squared force error",
