@@ -14,7 +14,7 @@ from ferryid.types import Floats
 from ferryid.vessel import load_profile
 from ferryid.vessel.profile import Profile
 
-TANKER, FERRY = load_profile("kvlcc2-model"), load_profile("milliampere")
+TANKER, FERRY, CATAMARAN = (load_profile(name) for name in ("kvlcc2-model", "milliampere", "vtec-usv"))
 N = 40
 
 
@@ -37,11 +37,14 @@ def measured(profile: Profile, columns: dict[str, Floats], current: Floats | Non
     )
 
 
-def weak(measurements: Measurements, factor: float, name: str) -> Floats:
-    plain = ForceModel(
+def of(measurements: Measurements) -> ForceModel:
+    return ForceModel(
         measurements, hull_of(measurements.profile), measurements.parts, measurements.angles, np.zeros((N, 3))
     )
-    return effects()["thruster_gain"].apply(plain, np.array([factor]), name).parts
+
+
+def weak(measurements: Measurements, factor: float, name: str) -> Floats:
+    return effects()["thruster_gain"].apply(of(measurements), np.array([factor]), name).parts
 
 
 @pytest.mark.parametrize("factor", [0.0, 0.6, 1.0, 1.5])
@@ -88,3 +91,24 @@ def test_a_step_goes_from_a_level_that_is_not_the_thrust_curves() -> None:
     np.testing.assert_array_equal(step.act(plain, p, "thruster2", 2.0).parts[:, 0], plain.parts[:, 0])
     level = effects()["thruster_gain"].apply(plain, p[1:], "thruster2")
     np.testing.assert_allclose(step.act(plain, np.array([1.0, 1.6]), "thruster2", 2.0).parts, level.parts)
+
+
+def test_a_factor_by_level_is_a_power_of_the_thrust_over_its_usual_size() -> None:
+    by_level = effects()["thruster_gain"].by_level
+    assert by_level is not None
+    force = np.where(np.arange(N) % 2 == 0, 10.0, 40.0)
+    columns = {"F_cmd_left": force, "F_cmd_right": np.full(N, 5.0)}
+    plain = of(measured(CATAMARAN, columns))
+    usual = np.sqrt(np.mean(force**2))
+    after = by_level.apply(plain, np.array([0.9, -0.5]), "left").parts
+    np.testing.assert_allclose(after[:, 0], plain.parts[:, 0] * (0.9 * (force / usual) ** -0.5)[:, None])
+    np.testing.assert_array_equal(after[:, 1], plain.parts[:, 1])
+    # Without a power it is the factor, of a thruster that stands still, too, and of a propeller with a rudder.
+    np.testing.assert_allclose(
+        by_level.apply(plain, np.array([0.9, 0.0]), "right").parts[:, 1], 0.9 * plain.parts[:, 1]
+    )
+    still = of(measured(CATAMARAN, columns | {"F_cmd_left": np.zeros(N)}))
+    assert not by_level.apply(still, np.array([0.9, -0.5]), "left").parts[:, 0].any()
+    ruddered = {"F_propeller": np.linspace(5.0, 40.0, N), "delta_propeller": np.linspace(-0.5, 0.5, N)}
+    same = by_level.apply(of(measured(TANKER, ruddered)), np.array([0.6, 0.0]), "propeller").parts
+    np.testing.assert_allclose(same, weak(measured(TANKER, ruddered), 0.6, "propeller"))

@@ -41,7 +41,7 @@ class Figures:
         Lower end of the 95 % interval of the share of the held-out squared force error, and of the free-run error, that it
         removes, by axis; the greatest over horizons.
     worse_runs
-        In how many of position, heading, speed and yaw rate free runs err more with it: `FreeRuns.worse`.
+        In which of position, heading, speed and yaw rate free runs err more with it: `FreeRuns.worse`.
     removed
         Share of the held-out squared force error that it removes while it acts, by axis; empty where nothing was held out.
     lasts_s, block_s
@@ -77,7 +77,7 @@ class Figures:
     score: float | None = None
     force_low: Mapping[str, float] = field(default_factory=dict)
     free_run_low: Mapping[str, float] = field(default_factory=dict)
-    worse_runs: int = 0
+    worse_runs: tuple[str, ...] = ()
     removed: Mapping[str, float] = field(default_factory=dict)
     lasts_s: float = inf
     block_s: float = 0.0

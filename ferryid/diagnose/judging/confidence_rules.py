@@ -232,11 +232,9 @@ def worse_in_free_runs(finding: Finding, context: Context, threshold: float) -> 
 
     Force errors are means over windows; what is wrong on average over a manoeuvre adds up in a free run.
     """
-    if context.own.kind != "force" or context.own.worse_runs < threshold:
+    if context.own.kind != "force" or len(context.own.worse_runs) < threshold:
         return finding, ""
-    return _because(
-        finding, f"free runs err more with it in {context.own.worse_runs} of position, heading, speed and yaw rate"
-    )
+    return _because(finding, f"free runs err more with it, in {listed(context.own.worse_runs)}")
 
 
 @rule(JUDGING.worsening, "of the held-out squared force error")

@@ -16,6 +16,8 @@ from ferryid.effects.force_model import Measurements
 from ferryid.effects.free_motion import run_freely
 from ferryid.types import Floats, Ints
 
+QUANTITIES = ("position", "heading", "speed", "yaw rate")
+"""What the errors of a free run are of."""
 DIVERGED = 1e6
 """State beyond which a free run is stopped [m, rad, m/s, rad/s]."""
 
@@ -45,16 +47,14 @@ class FreeRuns:
     starts: int
 
     @property
-    def worse(self) -> int:
-        """In how many of the four errors grow by more than `JUDGING.worse_run`, and by more than chance.
-
-        Over the longest horizon that has data.
-        """
+    def worse(self) -> tuple[str, ...]:
+        """Which of `QUANTITIES` err more, by `JUDGING.worse_run` and beyond chance, over the longest horizon with data."""
         known = np.flatnonzero(np.isfinite(self.removed).any(axis=1))
         if not known.size:
-            return 0
+            return ()
         removed, high = self.removed[known[-1]], self.high[known[-1]]
-        return int(np.count_nonzero((removed < -JUDGING.worse_run) & (high < 0.0)))
+        worse = (removed < -JUDGING.worse_run) & (high < 0.0)
+        return tuple(name for name, more in zip(QUANTITIES, worse.tolist(), strict=True) if more)
 
 
 def free_runs(problem: EstimationProblem, folds: Folds, before: Sequence[Fit], after: Sequence[Fit]) -> FreeRuns:

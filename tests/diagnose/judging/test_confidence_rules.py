@@ -41,6 +41,7 @@ from ferryid.diagnose.judging.confidence_rules import (
     unexplained_shares,
     with_another_force,
     worse_altogether,
+    worse_in_free_runs,
     worse_on_an_axis,
 )
 from ferryid.diagnose.judging.finding import UNKNOWN, Finding, LawTerm
@@ -66,7 +67,7 @@ def on(kind: Kind, **figures: object) -> Context:
 
 def test_every_rule_has_a_name_a_line_and_its_unit() -> None:
     names = [one.name for one in RULES]
-    assert len(names) == len(set(names)) == 26
+    assert len(names) == len(set(names)) == 27
     for one in RULES:
         assert one.about.endswith((".", ":", ",")) or one.about, one.name
         assert (one.threshold is None) == (one.unit == ""), one.name
@@ -207,6 +208,16 @@ def test_what_makes_an_axis_worse_is_a_hint_and_the_axis_is_named() -> None:
     _, note = worse_on_an_axis(found("wind"), on("force", removed={"surge": 0.6, "yaw": -3.33}))
     assert note == "Steady wind is a hint: it makes the held-out squared force error in yaw 333 % larger."
     assert stands(worse_on_an_axis, found(UNKNOWN, yaw=-0.5), on("law"))
+
+
+def test_a_force_with_which_free_runs_err_more_is_a_hint() -> None:
+    every = ("position", "heading", "speed", "yaw rate")
+    for count in range(5):
+        context = on("force", worse_runs=every[:count])
+        assert stands(worse_in_free_runs, found("wind"), context) == (count < 2)
+    _, note = worse_in_free_runs(found("wind"), on("force", worse_runs=every[:3]))
+    assert note == "Steady wind is a hint: free runs err more with it, in position, heading and speed."
+    assert stands(worse_in_free_runs, found(UNKNOWN), on("law", worse_runs=every))
 
 
 def test_where_all_findings_together_make_every_axis_worse_none_of_them_is_sure() -> None:

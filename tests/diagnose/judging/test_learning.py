@@ -14,10 +14,12 @@ import numpy as np
 import pytest
 
 from ferryid.compare.evaluation import evaluate
+from ferryid.diagnose.judging import learning
 from ferryid.diagnose.judging.diagnosis import Diagnosis, to_json
 from ferryid.diagnose.judging.learning import Learned, Learner, without_withheld
 from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS, UNITS, hull_of
+from ferryid.errors import ReversedForcesError
 from ferryid.export.model_file import export_model
 from ferryid.identify import Acceptance, FitSettings, accept, fit_logs, prediction_errors, read_logs, with_remainder
 from ferryid.identify.outcome import EstimatorScore
@@ -300,6 +302,26 @@ def test_a_log_that_cannot_be_fitted_leaves_the_model_as_it_is(folder: Path) -> 
     stored, learned = Learner((short,), FERRY, None, RunContext(folder), QUICK).learn(model, "ferry")
     assert stored is model
     assert learned.says.startswith("Nothing was learned beside the findings: ")
+
+
+def test_forces_that_are_reversed_beside_the_findings_alone_end_nothing(
+    windy: tuple[str, Model], folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log, model = windy
+
+    def reversed_forces(*given: object) -> None:
+        raise ReversedForcesError("log: the sway force accelerates the vessel the wrong way. Fix: change the frame")
+
+    monkeypatch.setattr(learning, "fit_remainder", reversed_forces)
+    stored, learned = Learner((log,), FERRY, None, RunContext(folder), QUICK).learn(model, "ferry")
+    assert stored is model
+    assert learned.says == (
+        "Nothing was learned beside the findings: with the findings, log: the sway force accelerates the vessel the wrong way."
+    )
+    # Where the log shows it by itself, the profile is wrong.
+    monkeypatch.setattr(learning, "fit_opened", reversed_forces)
+    with pytest.raises(ReversedForcesError, match="the wrong way"):
+        Learner((log,), FERRY, None, RunContext(folder), QUICK).learn(model, "ferry")
 
 
 def test_what_is_stored_predicts_what_was_fitted(windy: tuple[str, Model], folder: Path) -> None:
