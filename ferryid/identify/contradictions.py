@@ -49,6 +49,9 @@ def wrong_way(
     )
     if max(-response[axis] for axis in wrong) < IDENTIFY.opposite:
         cause = "the motion hardly follows the applied force at all, rather than going against it"
+        if wrong == [2] and (actuators > 1 or angles):
+            one = "exchanged actuators" if actuators > 1 else "an angle of the wrong sign"
+            cause += f", or {one} with a moment that is several times too large"
         remedy = (
             "check which signal drives which actuator, position_m and angle_deg of each, and the unit of their signals"
         )

@@ -178,6 +178,13 @@ def _undecided(found: ForceResponse, profile: Profile) -> str:
         return ""
     causes = ["exchanged actuators"] if actuators > 1 else []
     causes += ["an angle of the wrong sign"] if angles else []
+    if value < -found.sigmas[yaw] * spread:
+        return (
+            f"The vessel turns against the yaw moment, by {value:.2g} ± {spread:.2g} of what the base model expects: more than "
+            f"chance, but less than any inertia lets it. {' or '.join(causes).capitalize()} would do that where the moment is "
+            "several times too large, or the inertia of the profile too small. Compare the yaw rate in turns to both sides "
+            "with the actuators."
+        )
     return (
         f"These logs do not show whether the yaw moment acts the right way round: the vessel follows it by {value:.2g} ± "
         f"{spread:.2g} of what the base model expects, and {' or '.join(causes)} would look alike. Record turns to both sides."

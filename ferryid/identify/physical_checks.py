@@ -48,10 +48,16 @@ def inertia_checks(profile: Profile, mass: Floats) -> tuple[Check, ...]:
         if low * (1.0 + _ROUNDING) < share and not at_most:
             meaning = "it is possible"
         elif at_most and (largest if coupled else share) <= highest:
+            # A mass is weighed, a moment of inertia mostly guessed, and a lever arm is as good as a thrust.
+            small, rest = (
+                (", the inertia of the profile too small", "position_m of the actuators, inertia_z or k_zz_m")
+                if axis == "yaw"
+                else ("", "mass_kg")
+            )
             meaning = (
                 "it is held at that bound, and the data would have more, which no hull has: the applied force may be "
-                "too large or of the wrong sign, or the actuators were not engaged. Fix: in the profile, correct the unit and "
-                "sign of the actuators' signals, the thrust curve or mass_kg"
+                f"too large or of the wrong sign{small}, or the actuators were not engaged. Fix: in the profile, correct the "
+                f"unit and sign of the actuators' signals, the thrust curve{',' if small else ' or'} {rest}"
             )
         elif possible:
             meaning = "it is held at that bound, beyond which the data would have it"

@@ -29,7 +29,7 @@ TRIED = 50
 MARKS = 100
 """Places of a log, evenly spaced, whose samples are kept as hashes, most."""
 HEADING = "psi"
-COMPARED = (("x", "y"), ("u", "v"), (HEADING,))
+COMPARED = (("x", "y"), ("u", "v"), ("vel_N", "vel_E"), (HEADING,))
 """Signals of one topic that are compared: the first of them that both logs have and that changes."""
 
 

@@ -51,6 +51,13 @@ def test_an_inertia_held_at_its_upper_bound_is_none_that_a_hull_has() -> None:
     assert "the applied force may be too large or of the wrong sign, or the actuators were not engaged. Fix:" in reason
 
 
+def test_an_inertia_in_yaw_at_its_upper_bound_may_be_a_guess_of_the_profile() -> None:
+    checks = {one.name: one for one in inertia_checks(PROFILE, np.diag([5.0, 1.5, 5.0]) @ np.diag(np.diag(RIGID)))}
+    assert "inertia_z or k_zz_m" in checks["inertia_yaw"].reason
+    assert "mass_kg" in checks["inertia_surge"].reason
+    assert "k_zz_m" not in checks["inertia_surge"].reason
+
+
 def test_a_bound_is_met_in_whatever_direction_the_inertia_is_that_large() -> None:
     """Sway and yaw coupled: the diagonal is within its bounds, another direction is at them, as the estimate holds it."""
     root = np.linalg.cholesky(RIGID)

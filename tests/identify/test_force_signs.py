@@ -47,6 +47,7 @@ OTHERS = {
 }
 LINES = '[signals."left.force.command"] with [signals."right.force.command"]'
 UNKNOWN = "These logs do not show whether the yaw moment acts the right way round: the vessel follows it by "
+AGAINST = "The vessel turns against the yaw moment, by -0.0"
 
 
 @pytest.fixture(scope="module")
@@ -125,6 +126,13 @@ def test_a_log_too_short_to_fit_says_what_it_leaves_open_as_well(opened: Opened)
         fit_opened([replace(opened, measured=short)], PROFILE, FitSettings(), RunContext(Path("nowhere")), "short")
 
 
+def test_a_moment_that_is_too_large_and_reversed_is_not_said_to_be_unknown(opened: Opened) -> None:
+    log = measured(1, seconds=240.0, jitter=0.03)
+    told = refuse_reversed_forces(data_of(opened, replace(log, tau=log.tau * np.array([1.0, 1.0, -15.0]))))
+    assert told.startswith(AGAINST)
+    assert "Exchanged actuators or an angle of the wrong sign would do that" in told
+
+
 def test_what_a_log_cannot_show_is_said_and_not_refused(opened: Opened) -> None:
     drowned = without_a_moment(measured(1, seconds=240.0, jitter=0.03))
     told = refuse_reversed_forces(data_of(opened, drowned))
@@ -168,7 +176,7 @@ def test_exchanged_thrusters_of_single_real_runs(
         assert LINES in str(error.value)
         return
     # The vessel follows neither the moment nor the thrust there.
-    assert refuse_reversed_forces(recorded([log], exchanged(), tmp_path)).startswith(UNKNOWN)
+    assert refuse_reversed_forces(recorded([log], exchanged(), tmp_path)).startswith((UNKNOWN, AGAINST))
 
 
 @pytest.mark.slow

@@ -431,6 +431,9 @@ def test_forces_that_are_hardly_followed_are_not_taken_for_reversed_ones() -> No
     assert "the motion hardly follows the applied force at all" in said
     assert "which signal drives which actuator, position_m and angle_deg" in said
     assert "opposite sides" not in said
+    assert "exchanged" not in said
+    alone = wrong_way(np.array([np.nan, np.nan, -0.05]), spread, "the profile boat")
+    assert "or exchanged actuators with a moment that is several times too large" in alone
     assert "opposite sides" in wrong_way(np.array([0.9, -0.3, 0.8]), spread, "the profile boat")
     assert wrong_way(np.array([0.008, -0.03, 0.5]), spread, "the profile boat") == ""
 

@@ -85,6 +85,14 @@ def test_without_a_position_velocities_count() -> None:
     assert not same_recording(recording(**swell), recording(**track(3)))
 
 
+def test_velocities_over_ground_count_before_a_coarse_heading() -> None:
+    zigzag = np.round(20.0 * np.sin(0.01 * np.arange(2000)), 1)
+    first, second = ({"vel_N": track(k)["x"], "vel_E": track(k)["y"], "psi": zigzag} for k in (3, 4))
+    assert has_marks(recording(**first), [motion_marks(recording(**first))])
+    assert not has_marks(recording(**second), [motion_marks(recording(**first))])
+    assert not same_recording(recording(**second), recording(**first))
+
+
 def test_of_many_logs_the_copies_are_those_of_each_pair() -> None:
     still = dict.fromkeys(("x", "y"), np.zeros(2000))
     logs = [recording(**one) for one in (track(1), track(2), cut(track(1), slice(700, 1500)), still, {})]

@@ -95,7 +95,7 @@ def held_rows(values: Floats, usable: NDArray[np.bool_], step_s: float) -> NDArr
         missed = abs(float(values[min(last + 1, len(values) - 1)] - values[last]))
         if (
             values[first] != 0.0
-            and missed > jump
+            and missed > max(jump, _rounding(values, usable, first, last))
             and missed >= CHECKS.held_missed * _usual(values, usable, first, last)
         ):
             held[first + 1 : last + 1] = True
@@ -131,6 +131,24 @@ def _least_jump(values: Floats, usable: NDArray[np.bool_]) -> float:
     changes = changes[changes > 0.0]
     coarse = np.unique(np.round(changes, 9)).size < CHECKS.coarse_share * len(changes)
     return CHECKS.held_jump * float(np.median(changes)) if coarse or _interpolated(values, usable) else 0.0
+
+
+def _rounding(values: Floats, usable: NDArray[np.bool_], first: int, last: int) -> float:
+    """Return how far a channel has to jump after a hold where its values repeat at times around it too, else zero.
+
+    Numbers written with so many digits are coarser where they are large: a degree beyond 100, a tenth below. A whole log then
+    has no one resolution, and between the rows of a grid a step of it is in two parts.
+    """
+    same = np.flatnonzero(usable[1:] & usable[:-1])
+    step = np.abs(np.diff(values))[same]
+    changed = np.flatnonzero(step > 0.0)
+    before, after = changed[same[changed] < first], changed[same[changed] > last]
+    sides = [one for one in (before[-CHECKS.held_around :], after[: CHECKS.held_around]) if one.size]
+    rows = sum(int(one[-1] - one[0]) + 1 for one in sides)
+    changes = sum(one.size for one in sides)
+    if rows - changes < CHECKS.coarse_share * rows or not sides:
+        return 0.0
+    return CHECKS.held_jump * max(float(np.median(step[one])) for one in sides)
 
 
 def _usual(values: Floats, usable: NDArray[np.bool_], first: int, last: int) -> float:

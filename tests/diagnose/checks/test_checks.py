@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.checks import SensorFinding, checks, examine
+from ferryid.diagnose.checks.held_samples import held_rows
 from ferryid.effects.force_model import Measurements
 from ferryid.errors import FerryIdError
 from ferryid.signals.complementary_filter import complementary_filter
@@ -232,6 +233,20 @@ def test_a_coarse_or_slow_sensor_holds_nothing() -> None:
     eta = np.column_stack([_coarse(measurements.eta[:, :2], 0.02), _coarse(measurements.psi, np.radians(0.5))])
     slow = np.repeat(measurements.nu_raw[::10], 10, axis=0)[: len(measurements.t)]
     assert examine(replace(measurements, eta=eta, nu_raw=slow, nu=slow))[0] == ()
+
+
+def test_a_heading_of_three_digits_holds_nothing_but_what_is_held() -> None:
+    """Of a circle, resampled: hundredths of a degree at first, whole degrees beyond 100, a step of them in two parts."""
+    t = np.arange(0.0, 1200.0, 0.13)
+    turned = -0.45 * t
+    digits = 10.0 ** (np.floor(np.log10(np.maximum(np.abs(turned), 1.0))) - 2.0)
+    grid = np.arange(0.0, 1190.0, 0.14)
+    psi = np.radians(np.interp(grid, t, np.round(turned / digits) * digits))
+    usable = np.ones(len(grid), dtype=np.bool_)
+    assert not held_rows(psi, usable, 0.14).any()
+    first, last = 4000, 4200
+    psi[first:last] = psi[first]
+    assert np.flatnonzero(held_rows(psi, usable, 0.14))[[0, -1]] == pytest.approx([first, last], abs=20)
 
 
 def test_a_log_without_positions_still_has_its_gyro_checked() -> None:
