@@ -16,7 +16,7 @@ from ferryid.report.sweep_figures import curves, heat_cells, heat_map
 from ferryid.report.sweep_text import fit_with, headline, render_sweep
 from ferryid.report.sweep_timeline import sweep_timeline
 from ferryid.report.timeline import Timeline
-from ferryid.types import AXES, RunContext
+from ferryid.types import AXES, NOTHING, Given, RunContext
 from ferryid.vessel.profile import Profile
 
 
@@ -40,7 +40,7 @@ def sweep_and_report(
         what,
         found.logs,
         timelines,
-        lambda interactive: render(found, run.command, interactive),
+        lambda interactive: render(found, run.command, interactive, run.given),
         lambda report: sweep_json(found, report),
         render_sweep(found),
     )
@@ -77,7 +77,9 @@ def leave(
     return Report(plain, f"{text}\nreport  {report}", report)
 
 
-def render(found: Sweep, command: Sequence[str] = (), interactive: Interactive = STATIC) -> tuple[str, dict[str, str]]:
+def render(
+    found: Sweep, command: Sequence[str] = (), interactive: Interactive = STATIC, given: Given = NOTHING
+) -> tuple[str, dict[str, str]]:
     """Return the page of a sweep as HTML with the drawings inside, and the drawings (SVG) by name."""
     drawings, sections = {}, []
     for place, (key, choice) in enumerate(found.by.items()):
@@ -114,7 +116,7 @@ def render(found: Sweep, command: Sequence[str] = (), interactive: Interactive =
         tested=found.tested,
         settings={**found.settings.plain(), **found.settings.scale},
         many=len(found.windows_s) > 1,
-        next=after_sweep(found.fit_options, found.choice_beats_base, command),
+        next=after_sweep(found.fit_options, found.choice_beats_base, given),
     )
     return with_contents(page), drawings
 
