@@ -7,7 +7,7 @@ from typing import Any
 
 from ferryid.identify import FOLDS, FitSettings
 from ferryid.identify.sweeps import BY, Sweep, sweep_json, sweep_settings
-from ferryid.report.folder import PAGE, made, write_folder
+from ferryid.report.folder import made, place_of, write_folder
 from ferryid.report.html import template, with_contents
 from ferryid.report.interactive import STATIC, Interactive, make_interactive
 from ferryid.report.next_steps import after_sweep
@@ -68,13 +68,14 @@ def leave(
     """
     first = str(logs[0]["name"])
     more = f"-and-{len(logs) - 1}-more" if len(logs) > 1 else ""
-    report = run.out / "reports" / f"sweep-{what}-{first}{more}" / PAGE
+    place = place_of(run.out / "reports", f"sweep-{what}-{first}{more}", run.given.logs, run.command)
+    report = place.page
     plain = json_of(str(report))
-    interactive = make_interactive(timelines, report.parent, run.out)
+    interactive = make_interactive(timelines, place.folder, run.out)
     page, drawings = page_of(interactive)
-    write_folder(report.parent, page, drawings, plain, "sweep.json", scripts=interactive.files())
+    write_folder(place, page, drawings, plain, "sweep.json", scripts=interactive.files())
     run.progress("")
-    return Report(plain, f"{text}\nreport  {report}", report)
+    return Report(plain, f"{text}\nreport  {report}{place.note}", report)
 
 
 def render(
