@@ -98,7 +98,12 @@ def run_scenario(
         },
         "saturated_share": float(np.mean(control.saturated)),
         "undefined_aims": control.undefined_aims,
-        "warnings": [*(() if sailing is None else sailing.notes), *_rejected(asked), *_warnings(simulation)],
+        "warnings": [
+            *(() if sailing is None else sailing.notes),
+            *_rejected(asked),
+            *_warnings(simulation),
+            *simulation.notes,
+        ],
         **({} if model is None else {"model": model.label, "conditions": conditions or None}),
     }
 
