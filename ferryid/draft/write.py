@@ -86,6 +86,7 @@ class Answers:
 _FULL = {
     "full_rpm": ("speed at full power [rpm]", "1000.0"),
     "full_deg": ("angle at full travel [deg]", "35.0"),
+    "full_N": ("force at full power [N]", "100.0"),
 }
 """What a share of one is: key to its meaning and an example."""
 
@@ -97,7 +98,7 @@ def _full_key(signal: MappedSignal) -> str:
     if signal.full_deg:
         return ""
     role = signal.quantity.partition(".")[2].removesuffix(".command")
-    return {"speed": "full_rpm", "angle": "full_deg", "rudder": "full_deg"}.get(role, "")
+    return {"speed": "full_rpm", "angle": "full_deg", "rudder": "full_deg", "force": "full_N"}.get(role, "")
 
 
 def _full(signal: MappedSignal, key: str) -> tuple[str, str]:

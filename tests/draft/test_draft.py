@@ -463,6 +463,27 @@ def test_like_another_profile_a_draft_is_whole(tmp_path: Path) -> None:
     assert mapped(profile.signals) <= mapped(known.signals)
 
 
+def test_like_a_vessel_of_forces_a_speed_is_a_force_and_an_angle_none(tmp_path: Path) -> None:
+    text = re.sub(r"\[actuator\.thrust\](.|\n)*?(?=\n\[)", "", load_profile("milliampere").text)
+    text = text[: text.index("[signals.position]")].replace('kind = "azimuth"', 'kind = "force"')
+    forces = "".join(
+        f'[signals."thruster{k}.force.command"]\ntopic = "/force{k}"\nfield = "data"\nunit = "N"\n' for k in (1, 2)
+    )
+    place = '[signals.position]\ntopic = "/pose"\nfields = ["x", "y"]\nunit = "m"\nframe = "NED"\n'
+    heading = '[signals.heading]\ntopic = "/pose"\nfield = "psi"\nunit = "rad"\nframe = "NED"\n'
+    known = parse_profile(text + place + heading + forces, "forces.toml")
+    draft = draft_profile(FIXTURES / "short.mcap", known)
+    # That it can be read is what is tested: a speed or an angle of a force is refused.
+    profile = parse_profile(draft_text(draft, Answers("twin")), "twin.toml")
+    found = {signal.quantity: signal for signal in profile.signals if signal.quantity.startswith("thruster")}
+    assert set(found) == {f"thruster{k}.force{order}" for k in (1, 2) for order in ("", ".command")}
+    assert {signal.unit for signal in found.values()} == {"N"}
+    assert {signal.fields for signal in found.values()} == {("speed",)}
+    assert "its field is called a speed: that it is the force is as in the profile milliampere" in draft_text(
+        draft, Answers("twin")
+    )
+
+
 def mapped(signals: tuple) -> set[tuple]:
     return {(s.quantity, s.topic, s.fields, s.unit, s.frame, s.sign, tuple(sorted(s.options.items()))) for s in signals}
 
