@@ -13,7 +13,7 @@ from ferryid.report.interactive import STATIC, Interactive, make_interactive
 from ferryid.report.next_steps import after_sweep
 from ferryid.report.outcome import Report
 from ferryid.report.sweep_figures import curves, heat_cells, heat_map
-from ferryid.report.sweep_text import fit_with, headline, render_sweep
+from ferryid.report.sweep_text import by_itself, fit_with, headline, render_sweep
 from ferryid.report.sweep_timeline import sweep_timeline
 from ferryid.report.timeline import Timeline
 from ferryid.types import AXES, NOTHING, Given, RunContext
@@ -106,6 +106,7 @@ def render(
         headline=headline(found),
         estimator=found.estimator_says,
         fit_with=fit_with(found).partition(": ")[0],
+        by_itself=by_itself(found),
         options=" ".join(found.fit_options),
         notes=found.notes,
         logs=[{**log, "seconds": f"{log['seconds']:.0f}"} for log in found.logs],
