@@ -28,6 +28,8 @@ ORIGIN_DEG = (63.44, 10.4)
 """Latitude and longitude of the origin of simulated positions, for vessels that measure these; in the Trondheimsfjord."""
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _SAME = 1e-6
+APART_NS = 100_000
+"""Between messages of one topic that a device sends one after the other."""
 
 
 class _CannotHold(Exception):
@@ -328,7 +330,8 @@ def _stream(topic: str, written: Sequence[_Written], number: int) -> Stream:
         bases.append(base)
         parts.append(part)
     stamp_ns, receive_ns = (
-        np.concatenate([getattr(base, name) for base in bases]) for name in ("stamp_ns", "receive_ns")
+        np.concatenate([getattr(base, name) + k * APART_NS for k, base in enumerate(bases)])
+        for name in ("stamp_ns", "receive_ns")
     )
     order = np.argsort(receive_ns, kind="stable")
     columns = {path: np.concatenate([part[path] for part in parts])[order] for path in parts[0]}

@@ -135,6 +135,8 @@ def test_a_log_is_read_with_the_profile_it_was_simulated_with(trial: Simulation,
     for column in ("psi", "alpha_thruster1", "alpha_thruster2"):
         off = np.unwrap(read[column][1]) - np.unwrap(known[column][1])
         np.testing.assert_allclose(np.mod(off + 1.0, 2.0 * np.pi) - 1.0, 0.0, atol=1e-9)
+    # Messages of one topic come one after the other, as their stamps say.
+    assert {one.clock.source for one in record(tmp_path / name, boat).streams.values()} == {"stamp"}
     # The antenna is half a metre astern and 0.3 m to starboard of the origin; the first fix is the origin of the log.
     psi = known["psi"][1]
     for column, arm in (
