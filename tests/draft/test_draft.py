@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ferryid import api
-from ferryid.draft import Answers, Draft, Question, draft_profile, draft_text, questions
+from ferryid.draft import Answers, Draft, Question, StatedWindow, draft_profile, draft_text, new_profile, questions
 from ferryid.draft.actuators import UNKNOWN_ORDER
 from ferryid.draft.mapped import MappedSignal
 from ferryid.draft.write import as_text
@@ -497,6 +497,42 @@ def test_a_file_that_is_there_is_kept(tmp_path: Path) -> None:
     result = api.new_vessel(FIXTURES / "short.mcap", "milliampere", file=place, overwrite=True)
     assert result.json["fill_in"] == 0
     assert load_profile(place).name == "fixtures"
+
+
+def test_a_draft_that_is_whole_states_shorter_windows_where_the_log_needs_them(tmp_path: Path) -> None:
+    asked: list[Profile] = []
+
+    def windows(profile: Profile) -> StatedWindow:
+        asked.append(profile)
+        return StatedWindow(1.125, "Windows of 4.5 s keep 2 % in yaw.")
+
+    def made(like: Profile | None, **more: object) -> str:
+        return new_profile(
+            str(FIXTURES / "short.mcap"), like, file=Path("-"), progress=lambda _: None, windows=windows, **more
+        )[2]
+
+    text = made(load_profile("milliampere"))
+    assert "\n# Windows of 4.5 s keep 2 % in yaw.\nwindow_s = 1.1\n" in text
+    assert parse_profile(text, "twin.toml").window_s == 1.1
+    # Its length is not known before the lines of the hull are completed, and what --like states holds.
+    assert "window_s" not in made(None)
+    stated = load_profile("milliampere").text.replace('name = "milliampere"', 'name = "milliampere"\nwindow_s = 3.0', 1)
+    assert "window_s = 3\n" in made(parse_profile(stated, "stated.toml"))
+    assert len(asked) == 1
+
+
+@pytest.mark.slow
+def test_a_boat_that_zigzags_within_its_windows_is_drafted_with_shorter_ones(
+    shared_data: Callable[[str], Path], tmp_path: Path
+) -> None:
+    log = sorted(shared_data("vtec_usv").glob("exp37_*.bag"))[0]
+    like = re.sub(r"window_s = .*\n", "", load_profile("vtec-usv").text)
+    text = api.new_vessel(log, parse_profile(like, "like.toml"), file=tmp_path / "x.toml").json["toml"]
+    why = re.search(
+        r"# Windows of 4.35 s, by its length, .* of the variance of the velocity in this log\.\nwindow_s = ", text
+    )
+    assert why is not None
+    assert load_profile(tmp_path / "x.toml").window_s == pytest.approx(1.1, abs=0.1)
 
 
 RECORDINGS = {
