@@ -34,7 +34,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Simulation:
-    """One finished trial: the scenario and seed it came from, the truth, the messages that its log holds, and notes on them."""
+    """One finished trial: the scenario and seed it came from, the truth, the messages that its log holds.
+
+    `faults` are why these are not in the topics of the vessel's profile; none where they are.
+    """
 
     scenario: Scenario
     seed: int
@@ -42,7 +45,7 @@ class Simulation:
     truth: Truth
     control: Control
     streams: tuple[Stream, ...]
-    notes: tuple[str, ...] = ()
+    faults: tuple[str, ...] = ()
 
 
 def simulate(
@@ -78,8 +81,8 @@ def simulate(
     number = scenario.seed if seed is None else seed
     check_size(scenario, len(profile.actuators))
     truth, control = sail(scenario, profile, number, model, vessel, terms)
-    streams, notes = in_vessel_topics(sense(scenario, profile, number, truth, control), profile)
-    return Simulation(scenario, number, profile, truth, control, streams, notes)
+    streams, faults = in_vessel_topics(sense(scenario, profile, number, truth, control), profile)
+    return Simulation(scenario, number, profile, truth, control, streams, faults)
 
 
 def sail(

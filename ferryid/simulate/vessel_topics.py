@@ -17,6 +17,7 @@ from ferryid.ingest.row_columns import path_steps
 from ferryid.simulate.sensors import Stream, quaternion
 from ferryid.types import Floats, Nanoseconds
 from ferryid.vessel.frames import WGS84_A_M, WGS84_E2, to_world, wrap, yaw_of_quaternion
+from ferryid.vessel.load import load_profile
 from ferryid.vessel.profile import Profile, Signal
 from ferryid.vessel.pulses import pulse_of_share
 from ferryid.vessel.signal_map import canonical_columns, convert
@@ -26,6 +27,9 @@ from ferryid.vessel.units import factor
 ODOMETRY = "/navigation/odometry"
 ORIGIN_DEG = (63.44, 10.4)
 """Latitude and longitude of the origin of simulated positions, for vessels that measure these; in the Trondheimsfjord."""
+SIMULATED = "milliampere"
+"""A profile whose signals are those of the simulator."""
+_HEADER = re.compile(r"\s*\[{1,2}\s*([A-Za-z_]+)[^\[\]]*\]{1,2}\s*(?:#.*)?")
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _SAME = 1e-6
 APART_NS = 100_000
@@ -46,10 +50,11 @@ class _Written:
 
 
 def in_vessel_topics(streams: Sequence[Stream], profile: Profile) -> tuple[tuple[Stream, ...], tuple[str, ...]]:
-    """Return the streams of a trial with the profile's topics in the place of the simulator's, and notes.
+    """Return the streams of a trial with the profile's topics in the place of the simulator's, and why that was not possible.
 
     What the profile reads of the simulator's own topics as it is meant stays as it is; so do topics that no signal takes the
-    place of, as those of an IMU or a camera. A signal that messages cannot hold stays in the simulator's topic, with a note.
+    place of, as those of an IMU or a camera. Where messages cannot hold a signal of the profile, as a column of a table, all
+    stay in the simulator's topics: see `matching_profile`.
     """
     own = {stream.topic: stream for stream in streams}
     by_topic: dict[str, list[Signal]] = {}
@@ -58,12 +63,12 @@ def in_vessel_topics(streams: Sequence[Stream], profile: Profile) -> tuple[tuple
     made: list[Stream] = []
     used: set[str] = set()
     kept: set[str] = set()
-    notes: list[str] = []
+    faults: list[str] = []
     for topic, signals in by_topic.items():
         if topic in own and all(_reads(profile, one, own) for one in signals):
             kept.add(topic)
             continue
-        there = [(one, source) for one in signals if (source := _source(one.quantity, own, profile)) is not None]
+        there = [(one, source) for one in signals if (source := _source(one.quantity, own)) is not None]
         if not there:
             continue
         try:
@@ -73,16 +78,53 @@ def in_vessel_topics(streams: Sequence[Stream], profile: Profile) -> tuple[tuple
             made.append(_stream(topic, written, len(made)))
             used |= {source.topic for _, source in there}
         except _CannotHold as why:
-            notes.append(
-                f"the profile's topic {signals[0].topic} is not in this log: {why}. Fix: to read this log, map "
-                f"{', '.join(dict.fromkeys(source.topic for _, source in there))} in a copy of the profile"
-            )
-            kept |= {source.topic for _, source in there}
+            faults.append(f"{signals[0].topic}: {why}")
+    if faults:
+        return tuple(streams), tuple(faults)
     if made:
         # Feedback and orders that the vessel's own logs do not have.
         used |= {f"/{one.name}/{what}" for one in profile.actuators for what in ("state", "command")}
     replaced = {stream.topic for stream in made} | (used - kept)
-    return (*made, *(stream for stream in streams if stream.topic not in replaced)), tuple(notes)
+    return (*made, *(stream for stream in streams if stream.topic not in replaced)), ()
+
+
+def matching_profile(streams: Sequence[Stream], profile: Profile) -> str:
+    """Return a vessel's profile, as TOML, that reads the simulator's own topics of a trial."""
+    there = {stream.topic for stream in streams}
+    kept: list[str] = []
+    keep = True
+    for line in profile.text.splitlines():
+        if header := _HEADER.fullmatch(line):
+            keep = header[1] not in ("signals", "table")
+        if keep:
+            kept.append(line)
+    lines = ["\n".join(kept).rstrip(), ""]
+    for signal in load_profile(SIMULATED).signals:
+        if "." not in signal.quantity and signal.topic in there:
+            lines += [_block(load_profile(SIMULATED).text, signal.quantity), ""]
+    for actuator in profile.actuators:
+        force = actuator.kind == "force"
+        turn = {"azimuth": "angle", "propeller_rudder": "rudder"}.get(actuator.kind)
+        roles = [("force" if force else "speed", "speed", "N" if force else "rpm")]
+        roles += [(turn, "azimuth", "rad")] if turn else []
+        for what, order in (("state", ""), ("command", ".command")):
+            for role, field, unit in roles:
+                lines += [
+                    f'[signals."{actuator.name}.{role}{order}"]',
+                    f'topic = "/{actuator.name}/{what}"',
+                    f'field = "{field}"',
+                    f'unit = "{unit}"',
+                    "",
+                ]
+    return "\n".join(lines)
+
+
+def _block(text: str, quantity: str) -> str:
+    """Return the section of a signal."""
+    lines = text.splitlines()
+    start = next(k for k, line in enumerate(lines) if line.startswith(f"[signals.{quantity}]"))
+    end = next((k for k in range(start + 1, len(lines)) if _HEADER.fullmatch(lines[k])), len(lines))
+    return "\n".join(lines[start:end]).rstrip()
 
 
 def _topic(name: str) -> str:
@@ -120,7 +162,7 @@ def _mounted(signal: Signal) -> bool:
     return signal.quantity in ("position", "velocity") and any(signal.mount_m)
 
 
-def _source(quantity: str, own: Mapping[str, Stream], profile: Profile) -> Stream | None:
+def _source(quantity: str, own: Mapping[str, Stream]) -> Stream | None:
     """Return the simulator's stream that holds a quantity; None where the trial does not have it."""
     name, _, role = quantity.partition(".")
     if role:
@@ -366,7 +408,7 @@ def _definition(kind: str, paths: Sequence[str]) -> tuple[dict[str, int], str]:
         names = [step for step in steps if isinstance(step, str)]
         bad = next((name for name in names if not _NAME.fullmatch(name) or iskeyword(name)), None)
         if not names or bad is not None or names[0] == "header":
-            raise _CannotHold(f"no message has a field {bad or path}, as a table has")
+            raise _CannotHold(f'no message has a field "{path}", as a table has')
         if [type(step) for step in steps[len(names) :]] not in ([], [int]):
             raise _CannotHold(f"{path} is in an array of messages or arrays")
         holder = kind

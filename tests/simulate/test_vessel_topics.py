@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ferryid.errors import FerryIdError
 from ferryid.signals.recording import record
 from ferryid.simulate import Simulation, load_scenario, run_scenario, simulate, write_log
 from ferryid.simulate.vessel_topics import in_vessel_topics
@@ -179,7 +180,7 @@ def test_what_the_vessel_does_not_record_is_left_out(trial: Simulation) -> None:
     }
 
 
-def test_columns_of_a_table_that_no_message_has_are_named(tmp_path: Path) -> None:
+def test_a_log_of_a_table_whose_columns_no_message_has_comes_with_a_profile(tmp_path: Path) -> None:
     text = HULL + "".join(
         f'[signals.{name}]\ntopic = "table"\n{fields}\n'
         for name, fields in {
@@ -196,8 +197,19 @@ def test_columns_of_a_table_that_no_message_has_are_named(tmp_path: Path) -> Non
         'schema = "ferryid.scenario/1"\ntitle = "t"\nvessel = "boat.toml"\nduration_s = 5\n[path]\nkind = "four-corner"\n'
     )
     result = run_scenario(str(tmp_path / "trial.toml"), tmp_path, progress=lambda _: None)
-    assert any("heading (deg)" in warning and "map /navigation/odometry" in warning for warning in result["warnings"])
-    assert "/navigation/odometry" in result["topics"]
+    (warning,) = result["warnings"]
+    assert (
+        'the profile\'s table: no message has a field "heading (deg)", as a table has. Read it with --vessel' in warning
+    )
+    beside = load_profile(tmp_path / "trial.vessel.toml")
+    assert (beside.name, beside.hull.D, beside.actuators) == ("boat", FERRY.hull.D, FERRY.actuators)
+    read = columns(tmp_path / "trial.mcap", beside)
+    assert set(read) >= {"x", "psi", "u", "r", "n_thruster1", "alpha_thruster2", "n_cmd_thruster1", "X_d"}
+    # Nothing that is there is replaced unasked.
+    (tmp_path / "trial.mcap").unlink()
+    with pytest.raises(FerryIdError, match=r"trial\.vessel\.toml"):
+        run_scenario(str(tmp_path / "trial.toml"), tmp_path, progress=lambda _: None)
+    assert not (tmp_path / "trial.mcap").exists()
     # As columns that are words are no trouble, a table's profile reads the log of a table's vessel.
     plain = parse_profile(text.replace("heading (deg)", "heading"), "boat.toml")
     streams, notes = in_vessel_topics(simulate(replace(load_scenario("four-corner"), duration_s=5.0)).streams, plain)
