@@ -168,7 +168,7 @@ def compare(
     field = select_candidates(models, loaded, profile)
     comparison = compare_models(field, paths, run, window_s=window_s)
     progress("writing the report")
-    outcome = report(comparison, run.out, command)
+    outcome = report(comparison, run.out, command, paths)
     progress("")
     return outcome
 
