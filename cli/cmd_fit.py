@@ -44,7 +44,7 @@ def command(
     structure: Structure = "decoupled",
     components: Annotated[
         str,
-        typer.Option(help="Number of SIMPLS components, or auto: see ferryid sweep."),
+        typer.Option(help="Number of SIMPLS components, or auto: by cross-validation of the training rows."),
     ] = "auto",
     window: Annotated[str, typer.Option(help="Smoothing window [s], or auto: see ferryid sweep.")] = "1.0",
     smoother: Smoother = "square",

@@ -26,6 +26,32 @@ TimeRanges = tuple[TimeRange, ...]
 """Several of them; none for all of a log."""
 
 
+@dataclass(frozen=True)
+class Given:
+    """What a command was given, from which commands that follow it are made.
+
+    Attributes
+    ----------
+    logs
+        Logs as they were named; none of an archive.
+    vessel
+        Name or path of the profile; empty where it was found by the logs, or is no file.
+    out
+        Output folder; empty for the usual one.
+    ranges
+        What is used of every log; all of it where empty.
+    """
+
+    logs: tuple[str, ...] = ()
+    vessel: str = ""
+    out: str = ""
+    ranges: TimeRanges = ()
+
+
+NOTHING = Given()
+"""What a call was given that is no command."""
+
+
 def no_progress(_stage: str) -> None:
     """Show no progress."""
 
@@ -50,6 +76,8 @@ class RunContext:
         What is used of every log; all of it where empty.
     command
         The words that it was asked for with, which its pages repeat.
+    given
+        Logs and options among them.
     """
 
     out: Path
@@ -59,6 +87,7 @@ class RunContext:
     keep_tables: bool = True
     ranges: TimeRanges = ()
     command: Sequence[str] = ()
+    given: Given = NOTHING
 
     @property
     def tables(self) -> Path | None:

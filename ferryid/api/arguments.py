@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ferryid.models import Model
     from ferryid.report.outcome import Outcome
-    from ferryid.types import RunContext
+    from ferryid.types import Given, RunContext
     from ferryid.vessel.choice import VesselChoice
     from ferryid.vessel.profile import Profile
 
@@ -115,11 +115,28 @@ def model_of(model: str | Path | Model, out: Path) -> Model:
 
 
 def run_context(
-    out: str | Path, progress: Progress, verify: bool = False, ranges: Ranges = (), command: Sequence[str] = ()
+    out: str | Path,
+    progress: Progress,
+    verify: bool = False,
+    ranges: Ranges = (),
+    command: Sequence[str] = (),
+    given: Given | None = None,
 ) -> RunContext:
-    from ferryid.types import RunContext
+    from ferryid.types import NOTHING, RunContext
 
-    return RunContext(Path(out), progress, verify, ranges=tuple(ranges), command=tuple(command))
+    return RunContext(Path(out), progress, verify, ranges=tuple(ranges), command=tuple(command), given=given or NOTHING)
+
+
+def given_of(logs: Logs, vessel: str | Path | Profile | None, out: str | Path, ranges: Ranges) -> Given:
+    """Return logs and options as they were given, for the commands that a page names."""
+    from ferryid.types import Given
+
+    return Given(
+        (str(logs),) if isinstance(logs, str | Path) else tuple(str(log) for log in logs),
+        str(vessel) if isinstance(vessel, str | Path) else "",
+        "" if Path(out) == OUT else str(out),
+        tuple(ranges),
+    )
 
 
 def refuse_ranges_of_archive(ranges: Ranges) -> None:

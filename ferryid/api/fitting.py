@@ -12,6 +12,7 @@ from ferryid.api.arguments import (
     Progress,
     Ranges,
     chosen_vessel,
+    given_of,
     model_of,
     outcome_of,
     paths_of,
@@ -81,7 +82,7 @@ def fit(
 
     settings, run, paths = (
         settings or FitSettings(),
-        run_context(out, progress, verify, ranges, command),
+        run_context(out, progress, verify, ranges, command, given_of(() if archive else logs, vessel, out, ranges)),
         paths_of(logs),
     )
     if archive:
@@ -167,7 +168,7 @@ def compare(
     field = select_candidates(models, loaded, profile)
     comparison = compare_models(field, paths, run, window_s=window_s)
     progress("writing the report")
-    outcome = report(comparison, run.out, command)
+    outcome = report(comparison, run.out, command, paths)
     progress("")
     return outcome
 
@@ -197,7 +198,9 @@ def sweep(
     if archive:
         refuse_ranges_of_archive(ranges)
     profile = vessel_of_archive(Path(out), vessel, announce) if archive else chosen_vessel(paths, vessel, announce)
-    arguments = (paths, profile, settings or FitSettings(), run_context(out, progress, ranges=ranges, command=command))
+    asked = given_of(() if archive else logs, vessel, out, ranges)
+    run = run_context(out, progress, ranges=ranges, command=command, given=asked)
+    arguments = (paths, profile, settings or FitSettings(), run)
     given = {"windows_s": windows_s, "folds": FOLDS if folds is None else folds, "archive": archive}
     if what == "basis":
         return structures_and_report(*arguments, **given)  # type: ignore[arg-type]

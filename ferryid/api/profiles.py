@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from ferryid.api.arguments import Progress, Ranges, outcome_of, path_of, profile_of, quiet
 
 if TYPE_CHECKING:
-    from ferryid.draft import Question
+    from ferryid.draft import Question, StatedWindow
     from ferryid.report.outcome import Outcome
     from ferryid.vessel.profile import Profile
 
@@ -88,8 +88,33 @@ def new_vessel(
     """
     from ferryid.draft import new_profile
 
+    path, used = path_of(log), tuple(ranges)
+
+    def windows(profile: Profile) -> StatedWindow | None:
+        return _shorter_windows(path, profile, used)
+
     result, text, toml = new_profile(
-        path_of(log), None if like is None else profile_of(like), name=name, file=None if file is None else Path(file),
-        overwrite=overwrite, ask=ask, ranges=tuple(ranges), progress=progress,
+        path, None if like is None else profile_of(like), name=name, file=None if file is None else Path(file),
+        overwrite=overwrite, ask=ask, ranges=used, windows=windows, progress=progress,
     )  # fmt: skip
     return outcome_of({**result, "toml": toml}, text)
+
+
+def _shorter_windows(path: str, profile: Profile, ranges: Ranges) -> StatedWindow | None:
+    """Return the windows that a drafted profile is to state as the usual ones average out what the vessel does in the log."""
+    from ferryid.draft import StatedWindow
+    from ferryid.errors import FerryIdError
+    from ferryid.identify import FitSettings
+    from ferryid.regression import averaged_out
+    from ferryid.signals.prepare import prepare
+
+    try:
+        motion = prepare(path, profile, None, window_s=FitSettings().window_s, ranges=tuple(ranges)).motion
+    except FerryIdError:
+        # What is wrong with the log, or with the draft, the next command says.
+        return None
+    found = averaged_out(profile, [motion])
+    if not found.says:
+        return None
+    why = f"Windows of {found.usual_s:.3g} s, by its length, over which forces are averaged, keep {found.kept} in this log."
+    return StatedWindow(found.window_s, why)

@@ -2,6 +2,6 @@
 
 from ferryid.draft.create import new_profile
 from ferryid.draft.draft import Draft, draft_profile
-from ferryid.draft.write import Answers, Question, draft_text, questions
+from ferryid.draft.write import Answers, Question, StatedWindow, draft_text, questions
 
-__all__ = ["Answers", "Draft", "Question", "draft_profile", "draft_text", "new_profile", "questions"]
+__all__ = ["Answers", "Draft", "Question", "StatedWindow", "draft_profile", "draft_text", "new_profile", "questions"]

@@ -4,18 +4,32 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
 from ferryid.draft.draft import draft_profile
-from ferryid.draft.write import Answers, Question, answered, as_json, as_text, draft_text, questions
+from ferryid.draft.write import (
+    Answers,
+    Question,
+    StatedWindow,
+    answered,
+    as_json,
+    as_text,
+    draft_text,
+    open_lines,
+    questions,
+)
 from ferryid.errors import FerryIdError
 from ferryid.files import replacing
 from ferryid.types import TimeRanges
+from ferryid.vessel import parse_profile
 from ferryid.vessel.folder_settings import VESSEL_FILE, log_folder
 from ferryid.vessel.load import NAME, NAME_RULE
 from ferryid.vessel.profile import Profile
 
+Windows = Callable[[Profile], StatedWindow | None]
+"""Returns the windows that a profile is to state for the log; None where the usual ones serve."""
 Ask = Callable[[Question], str]
 """Returns the answer to a question, an empty one where it is left open."""
 
@@ -29,6 +43,7 @@ def new_profile(
     overwrite: bool = False,
     ask: Ask | None = None,
     ranges: TimeRanges = (),
+    windows: Windows | None = None,
     progress: Callable[[str], None],
 ) -> tuple[dict[str, Any], str, str]:
     """Draft a profile and write it.
@@ -49,6 +64,8 @@ def new_profile(
         Asks a person for what no log shows; what is not asked is a marked line.
     ranges
         What of the log is compared; all of it where empty.
+    windows
+        Looks at the log with the drafted profile, where nothing of that is left to complete.
     progress
         Called with the name of each stage.
 
@@ -82,10 +99,25 @@ def new_profile(
         values[question.key] = answer
     answers = Answers(named, values)
     draft, text = answered(draft, answers), draft_text(draft, answers)
+    if windows is not None and (whole := _whole(text)) is not None:
+        progress("looking at what its windows keep")
+        text = draft_text(draft, answers, windows(whole))
+        progress("")
     if str(place) != "-":
         with replacing(place, new=not overwrite, by="--file") as temporary:
             temporary.write_text(text, encoding="utf-8")
     return as_json(draft, str(place), text), as_text(draft, str(place), text), text
+
+
+def _whole(text: str) -> Profile | None:
+    """Return a drafted profile; None where lines are left to complete, it has faults, or it states its windows already."""
+    if open_lines(text):
+        return None
+    try:
+        profile = parse_profile(text, "draft")
+    except FerryIdError:
+        return None
+    return None if isfinite(profile.window_s) else profile
 
 
 def _shown(path: Path) -> Path:

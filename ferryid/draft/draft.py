@@ -25,6 +25,7 @@ from ferryid.signals.artificial import simulator
 from ferryid.types import TimeRanges
 from ferryid.vessel.field_words import words_of
 from ferryid.vessel.profile import Profile
+from ferryid.vessel.thrusters import needed_roles
 
 FRAME_ID = "header.frame_id"
 
@@ -148,7 +149,7 @@ def draft_profile(log: str | Path, like: Profile | None = None, ranges: TimeRang
     wind = wind_signal(winds, samples, motion)
     every = [*signals, *([] if wind is None else [wind]), *_tau_d(topics)]
     if like is not None:
-        actuators = [with_orders(one, like) for one in _named_like(actuators, like)]
+        actuators = [with_kind(with_orders(one, like), like) for one in _named_like(actuators, like)]
     used = {signal.topic for one in actuators for signal in one.signals} | {signal.topic for signal in every}
     notes = tuple(
         dict.fromkeys(note for topic in topics if topic.name in used for note in topic.note.split("; ") if note)
@@ -287,6 +288,38 @@ def as_order(signal: MappedSignal) -> MappedSignal:
     """Return the signal of an actuator as an order."""
     doubts = tuple(one for one in signal.doubts if one != UNKNOWN_ORDER)
     return replace(signal, quantity=f"{signal.quantity}.command", doubts=doubts)
+
+
+def with_kind(actuator: DraftedActuator, like: Profile) -> DraftedActuator:
+    """Return an actuator of the kind that a profile has it of, with signals of this kind.
+
+    What looks like the speed of an actuator that the profile has as a force is that force; an angle of one that does not turn
+    is none of its signals.
+    """
+    twin = next((one for one in like.actuators if one.name == actuator.name), None)
+    if twin is None:
+        return actuator
+    usual = {role for roles in needed_roles(twin) for role in roles}
+    there = {signal.quantity for signal in actuator.signals}
+    signals = []
+    for signal in actuator.signals:
+        role, dot, order = signal.quantity.partition(".")[2].partition(".")
+        as_force = f"{actuator.name}.force{dot}{order}"
+        if role in usual:
+            signals.append(signal)
+        elif twin.kind == "force" and role in ("speed", "thrust") and as_force not in there:
+            shares = ("%", "fraction", "us")
+            doubt = f"its field is called a {role}: that it is the force is as in the profile {like.name}"
+            signals.append(
+                replace(
+                    signal,
+                    quantity=as_force,
+                    unit=signal.unit if role == "thrust" or signal.unit in shares else "N",
+                    evidence=tuple(one for one in signal.evidence if not one.startswith("in ")),
+                    doubts=(*(one for one in signal.doubts if not one.startswith("the unit")), doubt),
+                )
+            )
+    return replace(actuator, kind=twin.kind, signals=tuple(signals))
 
 
 def _named_like(actuators: Sequence[DraftedActuator], like: Profile) -> list[DraftedActuator]:

@@ -83,9 +83,18 @@ class Answers:
     values: Mapping[str, str] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class StatedWindow:
+    """Length of the windows that a profile states [s], and why, as a sentence."""
+
+    length_s: float
+    why: str
+
+
 _FULL = {
     "full_rpm": ("speed at full power [rpm]", "1000.0"),
     "full_deg": ("angle at full travel [deg]", "35.0"),
+    "full_N": ("force at full power [N]", "100.0"),
 }
 """What a share of one is: key to its meaning and an example."""
 
@@ -97,7 +106,7 @@ def _full_key(signal: MappedSignal) -> str:
     if signal.full_deg:
         return ""
     role = signal.quantity.partition(".")[2].removesuffix(".command")
-    return {"speed": "full_rpm", "angle": "full_deg", "rudder": "full_deg"}.get(role, "")
+    return {"speed": "full_rpm", "angle": "full_deg", "rudder": "full_deg", "force": "full_N"}.get(role, "")
 
 
 def _full(signal: MappedSignal, key: str) -> tuple[str, str]:
@@ -230,8 +239,8 @@ def answered(draft: Draft, answers: Answers) -> Draft:
     return replace(draft, actuators=tuple(actuators))
 
 
-def draft_text(draft: Draft, answers: Answers) -> str:
-    """Return a draft as TOML; what was not answered is a marked comment."""
+def draft_text(draft: Draft, answers: Answers, window: StatedWindow | None = None) -> str:
+    """Return a draft as TOML; what was not answered is a marked comment. `window` is the length of windows that it states."""
     draft = answered(draft, answers)
     like = draft.like
     lines = [
@@ -241,6 +250,7 @@ def draft_text(draft: Draft, answers: Answers) -> str:
         + (f", hull and thrust as of {like.name}" if like is not None else "")
         + '; numbers of the hull and the thrusters: state where they come from"',
         *([f"window_s = {like.window_s:g}"] if like is not None and math.isfinite(like.window_s) else []),
+        *([] if window is None else [f"# {window.why}", f"window_s = {window.length_s:.2g}"]),
         "",
         f"# Lines marked {MARK.removeprefix('# ')} are what no log shows: remove the mark and correct the number. Evidence",
         "# stands above each signal, CHECK is what is assumed. Then: ferryid vessel check, ferryid inspect, ferryid fit.",

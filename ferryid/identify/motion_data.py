@@ -251,7 +251,7 @@ class LogData(MotionData):
         return (
             *filter(None, [faint]),
             *still_warnings(self.profile, self.motions),
-            *averaged_out(self.profile, self.motions),
+            *averaged_out(self.profile, self.motions).says,
             *fit_warnings(self.settings, self.split, excitation, self.prepared, self.motions, scores),
         )
 

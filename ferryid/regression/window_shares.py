@@ -8,6 +8,8 @@ explained by any inertia, or without the thrusters at all.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from math import nan
 
 import numpy as np
 
@@ -25,8 +27,41 @@ VARIES = 1e-20
 """Of the squared mean: a variance below it is rounding."""
 
 
-def averaged_out(profile: Profile, motions: Sequence[Motion]) -> tuple[str, ...]:
-    """Return a sentence on the axes whose motion windows average out, with the length to state; none where there are none.
+@dataclass(frozen=True)
+class AveragedOut:
+    """What windows of the vessel's usual length average out, and the length to state instead.
+
+    Attributes
+    ----------
+    usual_s, window_s
+        Length of the windows, and the one to state in the profile [s]; NaN where that is the usual one.
+    shares
+        What the usual ones keep, with its axis each.
+    """
+
+    usual_s: float
+    window_s: float = nan
+    shares: tuple[str, ...] = ()
+
+    @property
+    def kept(self) -> str:
+        """How little is kept, as the end of a sentence."""
+        return f"{listed(self.shares)} of the variance of the velocity"
+
+    @property
+    def says(self) -> tuple[str, ...]:
+        """A sentence for a person; none where nothing is lost."""
+        if not self.shares:
+            return ()
+        return (
+            f"The vessel's windows of {self.usual_s:.3g} s, over which forces are averaged, are long for these manoeuvres: "
+            f"they keep {self.kept}, so that little is seen of what the actuators do. At the top of "
+            f"the profile, window_s = {self.window_s:.2g} keeps more, for every command.",
+        )
+
+
+def averaged_out(profile: Profile, motions: Sequence[Motion]) -> AveragedOut:
+    """Return the axes whose motion windows average out, with the length to state.
 
     An axis counts where the windows keep less than `REGRESSION.least_kept` of the variance of its velocity, and of that of the
     force that its actuators put on it: either alone may be noise.
@@ -42,24 +77,21 @@ def averaged_out(profile: Profile, motions: Sequence[Motion]) -> tuple[str, ...]
     kept = kept_shares(motions, usual_s)
     # NaN, where no window fits, is neither.
     lost: Flags = np.max(kept, axis=0) < REGRESSION.least_kept
+    nothing = AveragedOut(usual_s)
     if not lost.any():
-        return ()
+        return nothing
     lengths = [share * usual_s for share in SHORTER if share * usual_s >= SHORTEST_WINDOW_S]
     tried = {length: kept_shares(motions, length).min(axis=0) for length in lengths}
     tried = {length: one for length, one in tried.items() if np.isfinite(one).all()}
     if not tried:
-        return ()
+        return nothing
     better = [length for length, one in tried.items() if (one[lost] >= REGRESSION.least_kept).all()]
     length_s = max(better, default=min(tried))
     if np.any(tried[length_s][lost] < REGRESSION.shorter_keeps):
         # What is gone in shorter ones as well is noise.
-        return ()
-    shares = [f"{100.0 * kept[0, k]:.0f} % in {axis}" for k, axis in enumerate(AXES) if lost[k]]
-    return (
-        f"The vessel's windows of {usual_s:.3g} s, over which forces are averaged, are long for these manoeuvres: they keep "
-        f"{listed(shares)} of the variance of the velocity, so that little is seen of what the actuators do. At the top of "
-        f"the profile, window_s = {length_s:.2g} keeps more, for every command.",
-    )
+        return nothing
+    shares = (f"{100.0 * kept[0, k]:.0f} % in {axis}" for k, axis in enumerate(AXES) if lost[k])
+    return AveragedOut(usual_s, length_s, tuple(shares))
 
 
 def kept_shares(motions: Sequence[Motion], length_s: float) -> Floats:

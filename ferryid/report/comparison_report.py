@@ -13,7 +13,7 @@ from ferryid.report.comparison_figures import looks
 from ferryid.report.comparison_page import MAX_LOGS, render
 from ferryid.report.comparison_words import render_effects
 from ferryid.report.fit_timeline import comparison_timeline
-from ferryid.report.folder import PAGE, made, write_folder
+from ferryid.report.folder import made, place_of, write_folder
 from ferryid.report.interactive import make_interactive
 from ferryid.report.outcome import Report
 
@@ -23,10 +23,10 @@ NAMED = 2
 """Models and logs that the folder's name holds; a sum stands for the others."""
 
 
-def report(comparison: Comparison, out: Path, command: Sequence[str] = ()) -> Report:
+def report(comparison: Comparison, out: Path, command: Sequence[str] = (), logs: Sequence[str] = ()) -> Report:
     """Write page, figures and JSON to a folder in ``reports``; a later comparison of the same models and logs replaces it.
 
-    `command` are the words that the comparison was asked for with; the page repeats them.
+    `command` are the words that the comparison was asked for with, which the page repeats, and `logs` the paths of its logs.
 
     Raises
     ------
@@ -34,15 +34,15 @@ def report(comparison: Comparison, out: Path, command: Sequence[str] = ()) -> Re
         For a folder that cannot be written; nothing half-written is left.
     """
     result = comparison.result
-    folder = out / "reports" / _folder(result)
-    file = folder / PAGE
+    place = place_of(out / "reports", _folder(result), logs, command)
+    file = place.page
     plain = {**result.to_json(), "headline": comparison_words.headline(result), "report": str(file)}
     look = looks(result.models)
     timelines = {k: comparison_timeline(log, result.models, look) for k, log in enumerate(comparison.logs[:MAX_LOGS])}
-    interactive = make_interactive(timelines, folder, out)
+    interactive = make_interactive(timelines, place.folder, out)
     page, drawings = render(result, comparison.logs, made(command), interactive)
-    write_folder(folder, page, drawings, plain, "compare.json", scripts=interactive.files())
-    return Report(plain, f"{as_text(result)}\n\nreport  {file}", file)
+    write_folder(place, page, drawings, plain, "compare.json", scripts=interactive.files())
+    return Report(plain, f"{as_text(result)}\n\nreport  {file}{place.note}", file)
 
 
 def as_text(result: ComparisonResult) -> str:

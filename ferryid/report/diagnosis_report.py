@@ -28,7 +28,7 @@ from ferryid.report.diagnosis_page import MAX_LOGS, as_text, render
 from ferryid.report.diagnosis_timeline import timelines
 from ferryid.report.diagnosis_words import findings_of, findings_of_all
 from ferryid.report.drawings import NONE, Drawings
-from ferryid.report.folder import PAGE, made, write_folder
+from ferryid.report.folder import made, place_of, write_folder
 from ferryid.report.interactive import make_interactive
 from ferryid.report.outcome import Report
 from ferryid.report.page_process import DrawingProcess, started
@@ -106,7 +106,8 @@ def report(
     shared: Path | None = None,
     drawings: Drawings = NONE,
 ) -> Report:
-    """Write page, figures and JSON to a folder of their own in ``reports``; a later diagnosis of the same logs replaces it.
+    """Write page, figures and JSON to a folder of their own in ``reports``; a later diagnosis of the same logs
+    replaces it.
 
     `command` are the words that the diagnosis was asked for with; the page repeats them. `shared` is the output folder that
     keeps the scripts of the interactive figures, where that is another than `out`. `drawings` are those that exist already.
@@ -116,16 +117,16 @@ def report(
     FerryIdError
         For a folder that cannot be written; nothing half-written is left.
     """
-    folder = out / "reports" / _folder(diagnoses)
+    place = place_of(out / "reports", _folder(diagnoses), [one.path for one in diagnoses if one.path], command)
     names = ", ".join(one.log for one in diagnoses[:2]) + (
         f" and {len(diagnoses) - 2} more" if len(diagnoses) > 2 else ""
     )
-    interactive = make_interactive(timelines(diagnoses, MAX_LOGS), folder, shared or out)
+    interactive = make_interactive(timelines(diagnoses, MAX_LOGS), place.folder, shared or out)
     page, drawn = render(diagnoses, f"{diagnoses[0].vessel} · {names}", made(command), interactive, drawings)
-    file = folder / PAGE
+    file = place.page
     plain = {**finite(as_json(diagnoses)), "report": str(file)}
-    write_folder(folder, page, drawn, plain, "diagnosis.json", scripts=interactive.files())
-    return Report(plain, f"{as_text(diagnoses)}\nreport  {file}", file)
+    write_folder(place, page, drawn, plain, "diagnosis.json", scripts=interactive.files())
+    return Report(plain, f"{as_text(diagnoses)}\nreport  {file}{place.note}", file)
 
 
 def as_json(diagnoses: Sequence[Diagnosis]) -> dict[str, Any]:

@@ -124,12 +124,12 @@ def _write_page(
 ) -> None:
     """Write the report of a fit, and store its model."""
     out = run.tables_out or run.out
-    page = None if process is None else process.page_of(result, folder, out, run.command)
+    page = None if process is None else process.page_of(result, folder, out, run.command, run.given)
     if page is None:
         # What draws takes half a second to import.
         from ferryid.report.page import page_of
 
-        page = page_of(result, folder, out, run.command)
+        page = page_of(result, folder, out, run.command, run.given)
     text, drawings, scripts = page
     if scripts:
         write_assets(out)

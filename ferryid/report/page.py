@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
-from shlex import split
 from typing import Any
 
 import numpy as np
@@ -24,7 +23,7 @@ from ferryid.report.interactive import STATIC, Interactive, interactive_of
 from ferryid.report.left_out import left_out_table
 from ferryid.report.next_steps import after_fit
 from ferryid.report.structure import remainder, worst_and_best_minute
-from ferryid.types import AXES, Floats
+from ferryid.types import AXES, NOTHING, Floats, Given
 from ferryid.vessel import parse_profile
 from ferryid.vessel.parse_hull import rigid_mass
 
@@ -36,7 +35,14 @@ Page = tuple[str, dict[str, str], dict[str, str]]
 """HTML, drawings (SVG) by name, and the data of the interactive figures by file name."""
 
 
-def page_of(result: FitOutcome, folder: Path, out: Path, command: Sequence[str], drawings: Drawings = NONE) -> Page:
+def page_of(
+    result: FitOutcome,
+    folder: Path,
+    out: Path,
+    command: Sequence[str],
+    given: Given = NOTHING,
+    drawings: Drawings = NONE,
+) -> Page:
     """Return the report of a fit.
 
     Parameters
@@ -47,12 +53,14 @@ def page_of(result: FitOutcome, folder: Path, out: Path, command: Sequence[str],
         Folder of the page, and the output folder that keeps the scripts of interactive figures; see `write_assets`.
     command
         The words that it was asked for with.
+    given
+        Logs and options among them.
     drawings
         Those that exist already.
     """
     timelines = {k: fit_timeline(log) for k, log in enumerate(result.logs[:MAX_LOGS])}
     interactive = interactive_of(timelines, folder, out)
-    text, every = render(result, interactive, made(command), drawings)
+    text, every = render(result, interactive, made(command), drawings, given)
     return text, every, interactive.files()
 
 
@@ -71,15 +79,15 @@ def render(
     interactive: Interactive = STATIC,
     origin: Mapping[str, str] | None = None,
     drawings: Drawings = NONE,
+    given: Given = NOTHING,
 ) -> tuple[str, dict[str, str]]:
     """Return the report of a fit as HTML with the drawings inside, and the drawings (SVG) by name.
 
-    `origin` is what `ferryid.report.folder.made` returns, and `drawings` are those that exist already.
+    `origin` is what `ferryid.report.folder.made` returns, `drawings` are those that exist already, and `given` is what the fit
+    was given.
     """
     context = {**_context(result, interactive, drawings), "made": origin}
-    files = [name for log in result.model.training for name in log["files"]]
-    command = split((origin or {}).get("command", ""))
-    context["next"] = after_fit(result.model.label, result.acceptance.accepted, files, command)
+    context["next"] = after_fit(result.model.label, result.acceptance.accepted, given)
     return with_contents(template("fit.html").render(context)), dict(_drawings(context))
 
 

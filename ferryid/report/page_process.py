@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from ferryid.diagnose import Diagnosis
     from ferryid.identify import FitOutcome
     from ferryid.report.page import Page
+    from ferryid.types import Given
 
 MOST_ROWS = 2_000_000
 """Rows of the logs of a fit, some hundred bytes each, that are handed over: longer ones would lie in memory twice."""
@@ -97,14 +98,16 @@ class PageProcess(_Process):
 
     serve = "serve_page"
 
-    def page_of(self, result: FitOutcome, folder: Path, out: Path, command: Sequence[str]) -> Page | None:
+    def page_of(
+        self, result: FitOutcome, folder: Path, out: Path, command: Sequence[str], *given: Given
+    ) -> Page | None:
         """Return what `ferryid.report.page.page_of` does; None where the process failed or too much were to be handed over."""
         import pickle
 
         if sum(len(log.motion.t) for log in result.logs) > MOST_ROWS:
             return None
         try:
-            request = pickle.dumps((result, folder, out, tuple(command)), protocol=5)
+            request = pickle.dumps((result, folder, out, tuple(command), *given), protocol=5)
         except (pickle.PicklingError, TypeError, AttributeError):  # something in it that is a process's own
             return None
         page: Page | None = self._answer(request)
@@ -172,9 +175,9 @@ def serve_page() -> None:
         from ferryid.report.page import load_all, page_of
 
         load_all()
-        asked: tuple[FitOutcome, Path, Path, Sequence[str]] = request()
+        asked: tuple[FitOutcome, Path, Path, Sequence[str], Given] = request()
         # Who asked waits meanwhile: its core is free for half of the drawings.
-        answer(drawn_by_two(lambda drawings: page_of(*asked, drawings)))
+        answer(drawn_by_two(lambda drawings: page_of(*asked, drawings=drawings)))
 
 
 def serve_drawings() -> None:

@@ -13,7 +13,7 @@ import matplotlib as mpl
 from ferryid.errors import FerryIdError, UnwritableError
 from ferryid.files import finite
 from ferryid.report.figures import MEASURED, STYLE, canvas, svg_text
-from ferryid.report.folder import PAGE, made, write_folder
+from ferryid.report.folder import made, place_of, write_folder
 from ferryid.report.held_signals import HeldLog, held_log
 from ferryid.report.html import template
 from ferryid.report.interactive import Interactive, make_interactive
@@ -49,13 +49,14 @@ def write_refusal(
     if not held:
         return None
     more = f"-and-{len(held) - 1}-more" if len(held) > 1 else ""
-    folder = run.out / "reports" / re.sub(r"[^\w.+-]+", "_", f"not-{what}-{held[0].name[:100]}{more}")
+    name = re.sub(r"[^\w.+-]+", "_", f"not-{what}-{held[0].name[:100]}{more}")
+    place = place_of(run.out / "reports", name, [one.path for one in held], command)
     drawn = held[:MAX_LOGS]
-    interactive = make_interactive({k: one.timeline for k, one in enumerate(drawn)}, folder, run.out)
+    interactive = make_interactive({k: one.timeline for k, one in enumerate(drawn)}, place.folder, run.out)
     page, drawings = _render(str(error), what, drawn, profile, made(command), interactive)
-    plain = finite(as_json(error, what, held, folder / PAGE))
-    write_folder(folder, page, drawings, plain, "refusal.json", scripts=interactive.files())
-    return folder / PAGE
+    plain = finite(as_json(error, what, held, place.page))
+    write_folder(place, page, drawings, plain, "refusal.json", scripts=interactive.files())
+    return place.page
 
 
 def _concerned(message: str, logs: Sequence[str], profile: Profile) -> list[str]:

@@ -25,7 +25,7 @@ from ferryid.report.structures_figures import forest
 from ferryid.report.structures_text import count_terms, render_structures, supported_structure
 from ferryid.report.structures_timeline import structures_timeline
 from ferryid.report.sweep_report import leave
-from ferryid.types import AXES, RunContext
+from ferryid.types import AXES, NOTHING, Given, RunContext
 from ferryid.vessel.profile import Profile
 
 
@@ -51,14 +51,14 @@ def structures_and_report(
         "basis",
         found.logs,
         {k: structures_timeline(one) for k, one in enumerate(found.by.values())},
-        lambda interactive: render(found, run.command, interactive),
+        lambda interactive: render(found, run.command, interactive, run.given),
         lambda report: structures_json(found, report),
         render_structures(found),
     )
 
 
 def render(
-    found: StructureSweep, command: Sequence[str] = (), interactive: Interactive = STATIC
+    found: StructureSweep, command: Sequence[str] = (), interactive: Interactive = STATIC, given: Given = NOTHING
 ) -> tuple[str, dict[str, str]]:
     """Return the page of compared structures as HTML with the drawings inside, and the drawings (SVG) by name."""
     drawings = {f"basis-{key}": forest(one) for key, one in found.by.items()}
@@ -92,7 +92,7 @@ def render(
         settings=plain["settings"],
         found=found,
         next=after_sweep(
-            ("--basis", best.basis, "--structure", best.structure), found.by["blocks"].any_beats_base, command
+            ("--basis", best.basis, "--structure", best.structure), found.by["blocks"].any_beats_base, given
         ),
     )
     return with_contents(page), drawings

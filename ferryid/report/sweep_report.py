@@ -7,16 +7,16 @@ from typing import Any
 
 from ferryid.identify import FOLDS, FitSettings
 from ferryid.identify.sweeps import BY, Sweep, sweep_json, sweep_settings
-from ferryid.report.folder import PAGE, made, write_folder
+from ferryid.report.folder import made, place_of, write_folder
 from ferryid.report.html import template, with_contents
 from ferryid.report.interactive import STATIC, Interactive, make_interactive
 from ferryid.report.next_steps import after_sweep
 from ferryid.report.outcome import Report
 from ferryid.report.sweep_figures import curves, heat_cells, heat_map
-from ferryid.report.sweep_text import fit_with, headline, render_sweep
+from ferryid.report.sweep_text import by_itself, fit_with, headline, render_sweep
 from ferryid.report.sweep_timeline import sweep_timeline
 from ferryid.report.timeline import Timeline
-from ferryid.types import AXES, RunContext
+from ferryid.types import AXES, NOTHING, Given, RunContext
 from ferryid.vessel.profile import Profile
 
 
@@ -40,7 +40,7 @@ def sweep_and_report(
         what,
         found.logs,
         timelines,
-        lambda interactive: render(found, run.command, interactive),
+        lambda interactive: render(found, run.command, interactive, run.given),
         lambda report: sweep_json(found, report),
         render_sweep(found),
     )
@@ -68,16 +68,19 @@ def leave(
     """
     first = str(logs[0]["name"])
     more = f"-and-{len(logs) - 1}-more" if len(logs) > 1 else ""
-    report = run.out / "reports" / f"sweep-{what}-{first}{more}" / PAGE
+    place = place_of(run.out / "reports", f"sweep-{what}-{first}{more}", run.given.logs, run.command)
+    report = place.page
     plain = json_of(str(report))
-    interactive = make_interactive(timelines, report.parent, run.out)
+    interactive = make_interactive(timelines, place.folder, run.out)
     page, drawings = page_of(interactive)
-    write_folder(report.parent, page, drawings, plain, "sweep.json", scripts=interactive.files())
+    write_folder(place, page, drawings, plain, "sweep.json", scripts=interactive.files())
     run.progress("")
-    return Report(plain, f"{text}\nreport  {report}", report)
+    return Report(plain, f"{text}\nreport  {report}{place.note}", report)
 
 
-def render(found: Sweep, command: Sequence[str] = (), interactive: Interactive = STATIC) -> tuple[str, dict[str, str]]:
+def render(
+    found: Sweep, command: Sequence[str] = (), interactive: Interactive = STATIC, given: Given = NOTHING
+) -> tuple[str, dict[str, str]]:
     """Return the page of a sweep as HTML with the drawings inside, and the drawings (SVG) by name."""
     drawings, sections = {}, []
     for place, (key, choice) in enumerate(found.by.items()):
@@ -103,6 +106,7 @@ def render(found: Sweep, command: Sequence[str] = (), interactive: Interactive =
         headline=headline(found),
         estimator=found.estimator_says,
         fit_with=fit_with(found).partition(": ")[0],
+        by_itself=by_itself(found),
         options=" ".join(found.fit_options),
         notes=found.notes,
         logs=[{**log, "seconds": f"{log['seconds']:.0f}"} for log in found.logs],
@@ -114,7 +118,7 @@ def render(found: Sweep, command: Sequence[str] = (), interactive: Interactive =
         tested=found.tested,
         settings={**found.settings.plain(), **found.settings.scale},
         many=len(found.windows_s) > 1,
-        next=after_sweep(found.fit_options, found.choice_beats_base, command),
+        next=after_sweep(found.fit_options, found.choice_beats_base, given),
     )
     return with_contents(page), drawings
 

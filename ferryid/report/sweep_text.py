@@ -12,7 +12,13 @@ from ferryid.types import AXES
 
 def render_sweep(found: Sweep) -> str:
     """Return a sweep for a terminal."""
-    lines = [headline(found), *([found.estimator_says] if found.estimator_says else []), fit_with(found), ""]
+    lines = [
+        headline(found),
+        *([found.estimator_says] if found.estimator_says else []),
+        fit_with(found),
+        by_itself(found),
+        "",
+    ]
     for key, choice in found.by.items():
         title = f"by {BY[key]}, {counted(choice.curves.folds, 'fold')}, {counted(choice.curves.rows, found.tested)}"
         lines += [title, *(_matrix(found, choice) if found.what == "both" else _table(found, choice)), ""]
@@ -35,6 +41,16 @@ def headline(found: Sweep) -> str:
 def fit_with(found: Sweep) -> str:
     """Return the options with which a fit uses the choice."""
     return f"{'Fit with' if found.choice_beats_base else 'To fit all the same'}: {' '.join(found.fit_options)}"
+
+
+def by_itself(found: Sweep) -> str:
+    """Return why a fit without these options may choose others, as a sentence."""
+    windows = (
+        " and, without --weak-window, tries windows of up to three times the usual length"
+        if found.weak and found.settings.weak_window_s is None
+        else ""
+    )
+    return f"Without them a fit may take others: it chooses on its training rows alone{windows}."
 
 
 def _table(found: Sweep, choice: Selection) -> list[str]:

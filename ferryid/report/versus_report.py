@@ -12,7 +12,7 @@ from ferryid.effects.wording import listed, uncapitalised
 from ferryid.errors import FerryIdError
 from ferryid.files import finite
 from ferryid.report.diagnosis_words import title
-from ferryid.report.folder import PAGE, made, write_folder
+from ferryid.report.folder import made, place_of, write_folder
 from ferryid.report.html import template
 from ferryid.report.interactive import STATIC, Interactive, make_interactive
 from ferryid.report.outcome import Report
@@ -55,14 +55,14 @@ def compare_and_report(
         raise FerryIdError(f'diagnose: --versus stores no model, found --name "{name}". Fix: leave out one of the two')
     found = compare_groups(logs, versus, profile, settings, run)
     run.progress("writing the report")
-    folder = run.out / "reports" / _folder(found)
+    place = place_of(run.out / "reports", _folder(found), [*logs, *versus], command)
     # A batch keeps the scripts where its tables are.
-    interactive = make_interactive({0: versus_timeline(found)}, folder, run.tables_out or run.out)
+    interactive = make_interactive({0: versus_timeline(found)}, place.folder, run.tables_out or run.out)
     page, drawings = render(found, command, interactive)
-    file = folder / PAGE
+    file = place.page
     plain = {**finite(versus_json(found)), "report": str(file)}
-    write_folder(folder, page, drawings, plain, "versus.json", scripts=interactive.files())
-    return Report(plain, f"{as_text(found)}\nreport  {file}", file)
+    write_folder(place, page, drawings, plain, "versus.json", scripts=interactive.files())
+    return Report(plain, f"{as_text(found)}\nreport  {file}{place.note}", file)
 
 
 def as_text(found: Versus) -> str:

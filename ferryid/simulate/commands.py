@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 import numpy as np
 
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError
+from ferryid.files import replacing
 from ferryid.models import Model
 from ferryid.models.store import load_file
 from ferryid.simulate.logs import write_log
@@ -17,6 +19,7 @@ from ferryid.simulate.output_paths import check_output, log_path
 from ferryid.simulate.scenario import Scenario, check_seed, list_scenarios, load_scenario
 from ferryid.simulate.trial import Simulation, simulate
 from ferryid.simulate.vessel_model import sailed_by
+from ferryid.simulate.vessel_topics import matching_profile
 
 SCHEMA = "ferryid.simulate/1"
 FASTEST_MPS = 15.0
@@ -78,6 +81,7 @@ def run_scenario(
     vessel, terms = (None, None) if sailing is None else (sailing.vessel, sailing.terms)
     simulation = simulate(asked, seed, vessel=vessel, terms=terms)
     progress("writing the log")
+    unread = _readable(simulation, log, overwrite=overwrite)
     write_log(simulation, log, truth, storage=storage, overwrite=overwrite)
     progress("")
     control = simulation.control
@@ -98,9 +102,28 @@ def run_scenario(
         },
         "saturated_share": float(np.mean(control.saturated)),
         "undefined_aims": control.undefined_aims,
-        "warnings": [*(() if sailing is None else sailing.notes), *_rejected(asked), *_warnings(simulation)],
+        "warnings": [
+            *(() if sailing is None else sailing.notes),
+            *_rejected(asked),
+            *_warnings(simulation),
+            *unread,
+        ],
         **({} if model is None else {"model": model.label, "conditions": conditions or None}),
     }
+
+
+def _readable(simulation: Simulation, log: Path, *, overwrite: bool) -> list[str]:
+    """Write a profile beside a log that the vessel's own cannot read, and say so."""
+    if not simulation.faults:
+        return []
+    place = log.with_name(f"{log.stem}.vessel.toml")
+    with replacing(place, new=not overwrite) as temporary:
+        temporary.write_text(matching_profile(simulation.streams, simulation.profile), encoding="utf-8")
+    more = f" ({counted(len(simulation.faults) - 1, 'more such topic')})" if len(simulation.faults) > 1 else ""
+    return [
+        f"the log has the simulator's own topics, as it cannot have the profile's {simulation.faults[0]}{more}. "
+        f"Read it with --vessel {quote(str(place))}, which was written beside it"
+    ]
 
 
 def _rejected(scenario: Scenario) -> list[str]:

@@ -49,8 +49,12 @@ def typestore(ros_version: int) -> Typestore:
 
 
 @cache
-def _store_of(name: str, ros_version: int) -> Typestore:
-    """Return message types that one is among: the few usual ones, if they will do."""
+def _store_of(name: str, ros_version: int, text: str = "") -> Typestore:
+    """Return message types that one is among: the few usual ones, if they will do, with one that `text` defines."""
+    if text:
+        store = usual_typestore() if ros_version == 2 else get_typestore(Stores.ROS1_NOETIC)
+        store.register(get_types_from_msg(text, name))
+        return store
     if ros_version == 2 and (name in USUAL or name in CUSTOM):
         return _few()
     return typestore(ros_version)
@@ -65,13 +69,22 @@ def _few() -> Typestore:
 
 
 @cache
-def definition(name: str, ros_version: int) -> tuple[str, str]:
-    """Return a type's definition with those of all types in it, and its hash; the ferry's own with their comments."""
-    text, digest = _store_of(name, ros_version).generate_msgdef(name, ros_version=ros_version)
+def definition(name: str, ros_version: int, own: str = "") -> tuple[str, str]:
+    """Return a type's definition with those of all types in it, and its hash; the ferry's own with their comments.
+
+    `own` is the definition of a type that is made for a vessel's own topics.
+    """
+    text, digest = _store_of(name, ros_version, own).generate_msgdef(name, ros_version=ros_version)
     if name in CUSTOM:
         _, line, others = text.partition("=" * 80)
         text = CUSTOM[name] + line + others
     return text, digest
+
+
+def type_hash(stream: Stream) -> str:
+    """Return the hash of a stream's type in ROS 2."""
+    store = _store_of(stream.type, 2, stream.definition) if stream.definition else typestore(2)
+    return store.hash_rihs01(stream.type)
 
 
 class MessageTable:
@@ -87,7 +100,7 @@ class MessageTable:
     """
 
     def __init__(self, stream: Stream, ros_version: int) -> None:
-        store, message = _store_of(stream.type, ros_version), _message(stream, ros_version)
+        store, message = _store_of(stream.type, ros_version, stream.definition), _message(stream, ros_version)
         self._template = _bytes(store, message, stream.type, ros_version)
         self.size = len(self._template)
         places = _places(store, stream.type, message, ros_version)
@@ -134,7 +147,7 @@ def sizes(stream: Stream, ros_version: int) -> NDArray[np.int64]:
 
 def _message(stream: Stream, ros_version: int) -> Any:
     """Return a message of a stream with what all of its messages share."""
-    message = _blank(_store_of(stream.type, ros_version), stream.type)
+    message = _blank(_store_of(stream.type, ros_version, stream.definition), stream.type)
     _put(message, "header.frame_id", stream.frame_id)
     for path, value in stream.constants.items():
         _put(message, path, value)

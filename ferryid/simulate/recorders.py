@@ -34,7 +34,7 @@ def write_mcap(
         channels = []
         for stream in streams:
             if stream.type not in schemas:
-                text = definition(stream.type, 2)[0]
+                text = definition(stream.type, 2, stream.definition)[0]
                 schemas[stream.type] = writer.register_schema(stream.type, "ros2msg", text.encode())
             channels.append(writer.register_channel(stream.topic, "cdr", schemas[stream.type]))
         writer.add_messages([_source(stream, channel) for stream, channel in zip(streams, channels, strict=True)])

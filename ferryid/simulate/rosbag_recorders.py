@@ -17,7 +17,7 @@ from rosbags.rosbag2.storage_mcap import McapWriter as McapStorage
 from rosbags.rosbag2.storage_sqlite3 import Sqlite3Writer as Sqlite3Storage
 
 from ferryid.errors import FerryIdError
-from ferryid.simulate.messages import definition, serialised, typestore
+from ferryid.simulate.messages import definition, serialised, type_hash
 from ferryid.simulate.sensors import Stream
 
 DISTRO = "jazzy"
@@ -35,7 +35,7 @@ def write_ros1(streams: list[Stream], path: Path, chunk_bytes: int) -> None:
     with writer:
         connections = []
         for stream in streams:
-            text, md5sum = definition(stream.type, 1)
+            text, md5sum = definition(stream.type, 1, stream.definition)
             connections.append(
                 writer.add_connection(
                     stream.topic, stream.type, msgdef=text, md5sum=md5sum, callerid=_node(stream.topic), latching=0
@@ -57,15 +57,14 @@ def write_ros2(streams: list[Stream], folder: Path, storage: str) -> None:
     writer = _Writer(folder, version=9, storage_plugin=plugin)
     if plugin is StoragePlugin.MCAP:
         writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
-    store = typestore(2)
     try:
         with writer:
             connections = [
                 writer.add_connection(
                     stream.topic,
                     stream.type,
-                    msgdef=definition(stream.type, 2)[0],
-                    rihs01=store.hash_rihs01(stream.type),
+                    msgdef=definition(stream.type, 2, stream.definition)[0],
+                    rihs01=type_hash(stream),
                     offered_qos_profiles=[_offered(stream.topic)],
                 )
                 for stream in streams

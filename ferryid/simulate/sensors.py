@@ -40,6 +40,8 @@ class Stream:
         Payload of every message of a camera.
     whole
         Every message as bytes already, of a type whose messages differ in length; then nothing but type and times counts.
+    definition
+        Of a type that is made for a vessel's own topics, with those of the types in it; empty for a known one.
     """
 
     topic: str
@@ -51,6 +53,7 @@ class Stream:
     constants: Mapping[str, Any] = field(default_factory=dict)
     blobs: tuple[bytes, ...] = ()
     whole: tuple[bytes, ...] = ()
+    definition: str = ""
 
 
 LINKS = {

@@ -23,6 +23,7 @@ from ferryid.simulate.scenario import Scenario, check_against
 from ferryid.simulate.sensors import Stream, sense
 from ferryid.simulate.size import check_size, steps_per_cycle
 from ferryid.simulate.states import Control, Truth
+from ferryid.simulate.vessel_topics import in_vessel_topics
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
 
@@ -33,7 +34,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Simulation:
-    """One finished trial: the scenario and seed it came from, the truth, and the messages that its log holds."""
+    """One finished trial: the scenario and seed it came from, the truth, the messages that its log holds.
+
+    `faults` are why these are not in the topics of the vessel's profile; none where they are.
+    """
 
     scenario: Scenario
     seed: int
@@ -41,6 +45,7 @@ class Simulation:
     truth: Truth
     control: Control
     streams: tuple[Stream, ...]
+    faults: tuple[str, ...] = ()
 
 
 def simulate(
@@ -76,7 +81,8 @@ def simulate(
     number = scenario.seed if seed is None else seed
     check_size(scenario, len(profile.actuators))
     truth, control = sail(scenario, profile, number, model, vessel, terms)
-    return Simulation(scenario, number, profile, truth, control, sense(scenario, profile, number, truth, control))
+    streams, faults = in_vessel_topics(sense(scenario, profile, number, truth, control), profile)
+    return Simulation(scenario, number, profile, truth, control, streams, faults)
 
 
 def sail(

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ferryid import api
-from ferryid.draft import Answers, Draft, Question, draft_profile, draft_text, questions
+from ferryid.draft import Answers, Draft, Question, StatedWindow, draft_profile, draft_text, new_profile, questions
 from ferryid.draft.actuators import UNKNOWN_ORDER
 from ferryid.draft.mapped import MappedSignal
 from ferryid.draft.write import as_text
@@ -463,6 +463,27 @@ def test_like_another_profile_a_draft_is_whole(tmp_path: Path) -> None:
     assert mapped(profile.signals) <= mapped(known.signals)
 
 
+def test_like_a_vessel_of_forces_a_speed_is_a_force_and_an_angle_none(tmp_path: Path) -> None:
+    text = re.sub(r"\[actuator\.thrust\](.|\n)*?(?=\n\[)", "", load_profile("milliampere").text)
+    text = text[: text.index("[signals.position]")].replace('kind = "azimuth"', 'kind = "force"')
+    forces = "".join(
+        f'[signals."thruster{k}.force.command"]\ntopic = "/force{k}"\nfield = "data"\nunit = "N"\n' for k in (1, 2)
+    )
+    place = '[signals.position]\ntopic = "/pose"\nfields = ["x", "y"]\nunit = "m"\nframe = "NED"\n'
+    heading = '[signals.heading]\ntopic = "/pose"\nfield = "psi"\nunit = "rad"\nframe = "NED"\n'
+    known = parse_profile(text + place + heading + forces, "forces.toml")
+    draft = draft_profile(FIXTURES / "short.mcap", known)
+    # That it can be read is what is tested: a speed or an angle of a force is refused.
+    profile = parse_profile(draft_text(draft, Answers("twin")), "twin.toml")
+    found = {signal.quantity: signal for signal in profile.signals if signal.quantity.startswith("thruster")}
+    assert set(found) == {f"thruster{k}.force{order}" for k in (1, 2) for order in ("", ".command")}
+    assert {signal.unit for signal in found.values()} == {"N"}
+    assert {signal.fields for signal in found.values()} == {("speed",)}
+    assert "its field is called a speed: that it is the force is as in the profile milliampere" in draft_text(
+        draft, Answers("twin")
+    )
+
+
 def mapped(signals: tuple) -> set[tuple]:
     return {(s.quantity, s.topic, s.fields, s.unit, s.frame, s.sign, tuple(sorted(s.options.items()))) for s in signals}
 
@@ -476,6 +497,42 @@ def test_a_file_that_is_there_is_kept(tmp_path: Path) -> None:
     result = api.new_vessel(FIXTURES / "short.mcap", "milliampere", file=place, overwrite=True)
     assert result.json["fill_in"] == 0
     assert load_profile(place).name == "fixtures"
+
+
+def test_a_draft_that_is_whole_states_shorter_windows_where_the_log_needs_them(tmp_path: Path) -> None:
+    asked: list[Profile] = []
+
+    def windows(profile: Profile) -> StatedWindow:
+        asked.append(profile)
+        return StatedWindow(1.125, "Windows of 4.5 s keep 2 % in yaw.")
+
+    def made(like: Profile | None, **more: object) -> str:
+        return new_profile(
+            str(FIXTURES / "short.mcap"), like, file=Path("-"), progress=lambda _: None, windows=windows, **more
+        )[2]
+
+    text = made(load_profile("milliampere"))
+    assert "\n# Windows of 4.5 s keep 2 % in yaw.\nwindow_s = 1.1\n" in text
+    assert parse_profile(text, "twin.toml").window_s == 1.1
+    # Its length is not known before the lines of the hull are completed, and what --like states holds.
+    assert "window_s" not in made(None)
+    stated = load_profile("milliampere").text.replace('name = "milliampere"', 'name = "milliampere"\nwindow_s = 3.0', 1)
+    assert "window_s = 3\n" in made(parse_profile(stated, "stated.toml"))
+    assert len(asked) == 1
+
+
+@pytest.mark.slow
+def test_a_boat_that_zigzags_within_its_windows_is_drafted_with_shorter_ones(
+    shared_data: Callable[[str], Path], tmp_path: Path
+) -> None:
+    log = sorted(shared_data("vtec_usv").glob("exp37_*.bag"))[0]
+    like = re.sub(r"window_s = .*\n", "", load_profile("vtec-usv").text)
+    text = api.new_vessel(log, parse_profile(like, "like.toml"), file=tmp_path / "x.toml").json["toml"]
+    why = re.search(
+        r"# Windows of 4.35 s, by its length, .* of the variance of the velocity in this log\.\nwindow_s = ", text
+    )
+    assert why is not None
+    assert load_profile(tmp_path / "x.toml").window_s == pytest.approx(1.1, abs=0.1)
 
 
 RECORDINGS = {

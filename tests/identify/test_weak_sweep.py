@@ -166,6 +166,8 @@ def test_auto_sweeps_what_a_fit_uses(run: Run, opened: Opened, noise: float, jit
     assert line.startswith("Estimator auto: ")
     assert "which a fit uses" in line
     assert render_sweep(found).splitlines()[1:3] == [line, "Fit with: " + " ".join(plain["fit_options"])]
+    told = render_sweep(found).splitlines()[3]
+    assert told.startswith("Without them a fit may take others: it chooses on its training rows alone")
     assert line in html.unescape(render(found)[0])
 
 

@@ -58,40 +58,40 @@ def test_a_sine_keeps_what_the_weight_of_the_window_passes() -> None:
 
 def test_a_bow_that_swings_within_a_window_is_said_with_the_length_that_keeps_it() -> None:
     usual = window_seconds(PROFILE)
-    (said,) = averaged_out(PROFILE, [swung(0.4 * usual)])
+    (said,) = averaged_out(PROFILE, [swung(0.4 * usual)]).says
     assert f"windows of {usual:.3g} s" in said
     assert "they keep 0 % in yaw of the variance of the velocity" in said
     length = float(said.partition("window_s = ")[2].split()[0])
     assert length == pytest.approx(0.25 * usual, rel=0.05)
-    assert averaged_out(replace(PROFILE, window_s=length), [swung(0.4 * usual)]) == ()
-    (said,) = averaged_out(PROFILE, [swung(0.75 * usual)])
+    assert averaged_out(replace(PROFILE, window_s=length), [swung(0.4 * usual)]).says == ()
+    (said,) = averaged_out(PROFILE, [swung(0.75 * usual)]).says
     assert float(said.partition("window_s = ")[2].split()[0]) == pytest.approx(0.5 * usual, rel=0.05)
-    assert averaged_out(PROFILE, [swung(4.0 * usual)]) == ()
+    assert averaged_out(PROFILE, [swung(4.0 * usual)]).says == ()
 
 
 def test_noise_of_one_signal_or_of_both_asks_for_no_shorter_windows() -> None:
     usual = window_seconds(PROFILE)
     slow, rng = swung(4.0 * usual), np.random.default_rng(4)
     noise = 20.0 * rng.normal(size=(2, len(slow.t)))
-    assert averaged_out(PROFILE, [motion(noise[0], slow.tau[:, 2])]) == ()
-    assert averaged_out(PROFILE, [motion(slow.nu[:, 2], noise[1])]) == ()
-    assert averaged_out(PROFILE, [motion(*noise)]) == ()
+    assert averaged_out(PROFILE, [motion(noise[0], slow.tau[:, 2])]).says == ()
+    assert averaged_out(PROFILE, [motion(slow.nu[:, 2], noise[1])]).says == ()
+    assert averaged_out(PROFILE, [motion(*noise)]).says == ()
 
 
 def test_no_window_is_proposed_that_no_profile_or_no_rate_allows() -> None:
     """Of 8 rows or more, and of 0.2 s or more: at 20 Hz, windows of 1.1 s have no shorter ones of a quarter or a half."""
     quick = replace(PROFILE, window_s=1.1)
-    (said,) = averaged_out(quick, [swung(0.7)])
+    (said,) = averaged_out(quick, [swung(0.7)]).says
     assert float(said.partition("window_s = ")[2].split()[0]) == pytest.approx(0.55)
-    assert averaged_out(replace(PROFILE, window_s=0.55), [swung(0.25)]) == ()
+    assert averaged_out(replace(PROFILE, window_s=0.55), [swung(0.25)]).says == ()
     assert np.isnan(kept_shares([swung(1.0)], 0.3)).all()
 
 
 def test_a_log_without_a_window_or_without_motion_says_nothing() -> None:
     swinging = swung(1.0)
-    assert averaged_out(PROFILE, [replace(swinging, valid=np.zeros(len(swinging.t), dtype=bool))]) == ()
-    assert averaged_out(PROFILE, [motion(0.0 * swinging.t, 0.0 * swinging.t)]) == ()
-    assert averaged_out(PROFILE, []) == ()
+    assert averaged_out(PROFILE, [replace(swinging, valid=np.zeros(len(swinging.t), dtype=bool))]).says == ()
+    assert averaged_out(PROFILE, [motion(0.0 * swinging.t, 0.0 * swinging.t)]).says == ()
+    assert averaged_out(PROFILE, []).says == ()
 
 
 def test_the_profile_of_the_boat_that_zigzags_states_its_windows() -> None:

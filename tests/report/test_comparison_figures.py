@@ -11,6 +11,7 @@ from ferryid.compare.candidates import select_candidates
 from ferryid.compare.comparison import Comparison, compare
 from ferryid.report.comparison_figures import forces, free_run_tracks, runs_to_draw
 from ferryid.report.comparison_page import render
+from ferryid.report.comparison_report import report
 from ferryid.types import RunContext
 from tests.compare.test_comparison import heavier
 
@@ -54,3 +55,14 @@ def test_each_free_run_has_its_panel_with_every_model(compared: Comparison) -> N
     assert [f">{start:.0f} to " in drawn for start in starts] == [True] * len(runs)
     assert drawn.count(">east [m]<") == len(runs)
     assert all(f">{label}<" in drawn for label in ("measured", *compared.result.labels))
+
+
+def test_a_comparison_on_another_log_of_that_name_has_a_folder_of_its_own(compared: Comparison, tmp_path: Path) -> None:
+    folders = {
+        month: report(
+            compared, tmp_path, ("ferryid", "compare", month), [str(tmp_path / month / "short.mcap")]
+        ).report.parent
+        for month in ("may", "june", "may")
+    }
+    assert len(set(folders.values())) == 2
+    assert len(list((tmp_path / "reports").glob("compare-*"))) == 2

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from html.parser import HTMLParser
+from pathlib import Path
 from shlex import split
 
 import pytest
@@ -12,17 +13,18 @@ import typer
 from ferryid.cli.app import app
 from ferryid.report.html import CONTENTS, template, with_contents
 from ferryid.report.next_steps import Step, after_fit, after_sweep
+from ferryid.types import Given, RunContext
 
-COMMAND = ("ferryid", "fit", "a b.mcap", "--vessel", "my boat.toml")
+GIVEN = Given(("a b.mcap",), "my boat.toml")
 
 
 @pytest.mark.parametrize(
     "steps",
     [
-        after_fit("ferry@2", True, ["a b.mcap"], COMMAND),
-        after_fit("ferry@2", False, ["a b.mcap"], COMMAND),
-        after_sweep(("--components", "3"), True, COMMAND),
-        after_sweep(("--components", "3"), False, COMMAND),
+        after_fit("ferry@2", True, GIVEN),
+        after_fit("ferry@2", False, GIVEN),
+        after_sweep(("--components", "3"), True, GIVEN),
+        after_sweep(("--components", "3"), False, GIVEN),
     ],
 )
 def test_steps_are_commands_of_ferryid_with_its_vessel(steps: list[Step]) -> None:
@@ -41,23 +43,61 @@ def test_steps_are_commands_of_ferryid_with_its_vessel(steps: list[Step]) -> Non
 
 
 def test_a_sweep_that_loses_to_the_base_model_leads_to_no_fit() -> None:
-    assert [command.split()[1] for _, command in after_sweep((), False, COMMAND)] == ["diagnose"]
-    assert [command.split()[1] for _, command in after_sweep((), True, COMMAND)] == ["fit", "diagnose"]
+    assert [command.split()[1] for _, command in after_sweep((), False, GIVEN)] == ["diagnose"]
+    assert [command.split()[1] for _, command in after_sweep((), True, GIVEN)] == ["fit", "diagnose"]
 
 
 def test_several_logs_are_not_named() -> None:
-    assert all(".mcap" not in command for _, command in after_fit("ferry@1", False, ["a.mcap", "b.mcap"], ()))
-    assert all("--vessel" not in command for _, command in after_fit("ferry@1", False, ["a.mcap"], ()))
+    several = Given(("a.mcap", "b.mcap"))
+    assert all(".mcap" not in command for _, command in after_fit("ferry@1", False, several))
+    assert all("--vessel" not in command for _, command in after_fit("ferry@1", False, several))
+    assert all(".mcap" not in command for _, command in after_sweep((), True, several))
 
 
-@pytest.mark.parametrize("told", [("--out", "sea trials"), ("--out=sea trials",)])
-def test_commands_find_the_log_and_the_model_where_the_fit_did(told: tuple[str, ...]) -> None:
-    command = ("ferryid", "fit", "logs/a.mcap", *told)
-    judge, lacks, *others = (split(step) for _, step in after_fit("ferry@1", True, ["a.mcap"], command))
+def test_commands_find_the_log_and_the_model_where_the_fit_did() -> None:
+    given = Given(("logs/a.mcap",), out="sea trials")
+    judge, lacks, *others = (split(step) for _, step in after_fit("ferry@1", True, given))
     assert lacks[2:] == ["logs/a.mcap"]
-    assert all(words[-len(told) :] == list(told) for words in (judge, *others))
+    assert all(words[-2:] == ["--out", "sea trials"] for words in (judge, *others))
     # A fit of an archive has no path of a log in its words.
-    assert split(after_fit("ferry@1", False, ["a.mcap"], ("ferryid", "fit", "--archive"))[0][1])[2:] == ["LOG"]
+    assert split(after_fit("ferry@1", False, Given())[0][1])[2:] == ["LOG"]
+
+
+def test_commands_take_what_was_used_of_a_log() -> None:
+    given = Given(("a.mcap",), ranges=(("60", "300"), ("-90", "-10")))
+    steps = [*after_fit("ferry@1", False, given), *after_sweep((), True, given)]
+    assert all(split(command)[-4:] == ["--from", "60,-90", "--to", "300,-10"] for _, command in steps)
+    from_a_time = Given(("a.mcap",), ranges=((60.0, None),))
+    assert split(after_sweep((), False, from_a_time)[0][1])[2:] == ["a.mcap", "--from", "60.0"]
+    # Of the log of another day all is used.
+    assert "--from" not in after_fit("ferry@1", True, given)[0][1]
+
+
+def test_the_value_of_an_option_is_no_log(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[Given] = []
+
+    def fitted(logs: object, profile: object, settings: object, run: RunContext, **_: object) -> None:
+        told.append(run.given)
+        raise StopIteration
+
+    monkeypatch.setattr("ferryid.report.fit_report.fit_and_report", fitted)
+    log = str(Path(__file__).parents[2] / "fixtures" / "short.mcap")
+    # A name, a folder or a profile may be called as the log is.
+    words = [
+        "fit",
+        log,
+        "--vessel",
+        "milliampere",
+        "--name",
+        Path(log).name,
+        f"--out={log}.d",
+        "--from",
+        "20",
+        "--no-report",
+    ]
+    with pytest.raises(StopIteration):
+        app(words, standalone_mode=False)
+    assert told == [Given((log,), "milliampere", f"{log}.d", (("20", None),))]
 
 
 def test_every_section_has_a_link() -> None:

@@ -226,7 +226,7 @@ def read_measurements(
         tuple(doubt.says for doubt in track.doubts if doubt.certain),
         comparable(track),
         tuple(sorted({fault.signal for fault in faults.poses if not fault.left_out})),
-        averaged_out(profile, [motion]),
+        averaged_out(profile, [motion]).says,
     )
     return measurements, survey
 

@@ -174,6 +174,8 @@ def _measured(measurements: Measurements) -> tuple[Condition, ...]:
             rows, ends = aboard(measurements.t, values, rows)
             candidate = replace(candidate, onset_s=ends.get("onset", 0.0), offset_s=ends.get("offset", inf))
         mean = np.asarray(values[rows].mean(axis=0))
+        # Factors on the load, which nothing measures, are as the profile has them.
+        mean = np.append(mean, [one.neutral for one in candidate.parameters[len(mean) :]])
         found.append(Condition(candidate, mean, np.zeros_like(mean)))
     return tuple(found)
 

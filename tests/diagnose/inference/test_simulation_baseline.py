@@ -100,6 +100,17 @@ def test_what_the_simulation_learnt_is_what_was_simulated(simulated: Simulation)
     np.testing.assert_allclose(blown.values[:2], [2.0, 0.0], atol=0.1)
 
 
+def test_a_wind_that_the_simulation_measures_is_a_condition_with_its_load_as_the_profile_has_it(folder: Path) -> None:
+    text = BASE.replace("camera_rate_hz = 0.0", "camera_rate_hz = 0.0, wind_rate_hz = 2.0") + wind(3.0)
+    write_log(simulate(parse_scenario(text, "measured"), 7), folder / "measured.mcap")
+    known = learn_simulation(str(folder / "measured.mcap"), FERRY)
+    (condition,) = against.simulation_as_json(known, "no path")["conditions"]
+    assert set(condition["parameters"]) == {"north", "east"}
+    assert condition["parameters"]["north"]["value"] == pytest.approx(3.0, abs=0.1)
+    (blown,) = known.conditions
+    np.testing.assert_array_equal(blown.values[2:], 1.0)
+
+
 def test_the_same_trial_with_other_noise_differs_in_nothing(folder: Path, simulated: Simulation) -> None:
     result = found(simulated, sailed(folder, "again", wind(2.0), 11))
     assert result.fit.candidates == ()
