@@ -21,7 +21,7 @@ from ferryid.diagnose.inference.group_differences import compare_estimated, scat
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.campaign_evidence import Gain, held_out_loss
-from ferryid.diagnose.judging.credibility import felt, interval_doubt, unfelt, value_doubt, worsened
+from ferryid.diagnose.judging.credibility import felt, idle_in_campaign, interval_doubt, unfelt, value_doubt, worsened
 from ferryid.diagnose.judging.experiment_design import manoeuvre
 from ferryid.diagnose.judging.finding import Finding, Rival
 from ferryid.diagnose.judging.rivals import alike, redundant_shape
@@ -242,6 +242,8 @@ def _credibility(made: CampaignFit, candidate: Candidate, estimates: Mapping[str
     """Return why a property cannot be true of the vessel, or would be felt in no log, as the end of a sentence."""
     profile = made.campaign.members[0].plain.measurements.profile
     values = {name: one.value for name, one in estimates.items()}
+    if doubt := idle_in_campaign(made):
+        return doubt
     if doubt := value_doubt(candidate.effect, candidate.parameters, values, profile):
         return doubt
     if doubt := interval_doubt(candidate.parameters, estimates, _covariance(made, candidate)):

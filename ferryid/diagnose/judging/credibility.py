@@ -16,7 +16,7 @@ from ferryid.diagnose.inference.force_errors import mass_of
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.effect import Effect, Parameter
-from ferryid.effects.force_model import COEFFICIENTS, UNITS
+from ferryid.effects.force_model import COEFFICIENTS, UNITS, ForceModel
 from ferryid.identify import inertia_checks
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
@@ -89,10 +89,19 @@ def idle_actuators(problem: EstimationProblem, kept: Fit) -> str:
 
     Forces that the motion does not follow fit best where they are none: masses and damping then have nothing to be told by.
     """
-    usable = problem.plain.measurements.usable
+    return _idle([(problem.plain, fitted_force_model(problem.plain, kept))])
+
+
+def idle_in_campaign(made: CampaignFit) -> str:
+    """Return that an estimate explains the motion of all logs but without their actuators; see `idle_actuators`."""
+    return _idle([(one.plain, made.whole_force_model(i)) for i, one in enumerate(made.campaign.members)])
+
+
+def _idle(logs: Sequence[tuple[ForceModel, ForceModel]]) -> str:
+    """Return it of logs, of each of which a plain force model and a fitted one are given."""
     recorded, left = (
-        float(np.linalg.norm(one.parts[usable, :, :2]))
-        for one in (problem.plain, fitted_force_model(problem.plain, kept))
+        float(np.sqrt(sum(np.sum(one[which].parts[one[0].measurements.usable, :, :2] ** 2) for one in logs)))
+        for which in (0, 1)
     )
     if left >= JUDGING.idle_share * recorded:
         return ""

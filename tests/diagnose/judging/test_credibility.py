@@ -24,6 +24,7 @@ from ferryid.diagnose.judging.credibility import (
     RefittedHull,
     campaign_hull,
     idle_actuators,
+    idle_in_campaign,
     impossible_masses,
     interval_doubt,
     refitted_hull,
@@ -119,6 +120,14 @@ def test_what_leaves_all_actuators_without_force_is_doubted() -> None:
         "beside it, the actuators are left with 3 % of their recorded force: the motion does not follow"
     )
 
+    def in_campaign(*factors: float) -> str:
+        left = [replace(plain, parts=one * parts) for one in factors]
+        campaign = SimpleNamespace(members=[SimpleNamespace(plain=plain) for _ in factors])
+        return idle_in_campaign(cast(Any, SimpleNamespace(campaign=campaign, whole_force_model=left.__getitem__)))
+
+    assert in_campaign(0.0, 1.0) == in_campaign(0.0, 0.0, 0.2) == ""
+    assert in_campaign(0.03, 0.03) == said
+
 
 def moved(coefficient: str, deviations: float) -> Any:
     return HULL + np.where(np.array(COEFFICIENTS) == coefficient, deviations * SPREAD, 0.0)
@@ -212,6 +221,7 @@ def test_a_factor_on_every_actuator_is_one_on_masses_that_nobody_knows(
         ("property_rows", slice(0, 1)),
         ("felt", np.ones((1, 3))),
         ("unfelt", ""),
+        ("idle_in_campaign", ""),
     ):
         monkeypatch.setattr(campaign_properties, name, lambda *_, value=value: value)
     said = campaign_properties._credibility(cast(Any, made), gains[0], {"factor": Estimate(0.04, -0.07, 0.15, "-")})
