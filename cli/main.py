@@ -42,6 +42,8 @@ def main() -> None:
             run(last=interrupts.end)
         finally:
             interrupts.by_default()
+            # Python looks through all that is left for circles before it ends, which takes up to half a second.
+            gc.freeze()
     except KeyboardInterrupt:
         # Before or after the command.
         os.write(2, INTERRUPTED)
