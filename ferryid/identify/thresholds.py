@@ -70,6 +70,12 @@ class IdentifyThresholds:
     block_purges: float = threshold(
         4.0, "purge gaps", "least length of a block", "convention: more rows are used than purged"
     )
+    block_windows: float = threshold(
+        2.0,
+        "windows",
+        "least length of a block where the usual ones are too short to judge a model in",
+        "convention: two windows that share nothing",
+    )
     window_stretches: float = threshold(
         10.0,
         "windows",
