@@ -137,6 +137,12 @@ class IdentifyThresholds:
         "constant force on an axis from which a warning says that the model does not stay at rest",
         "convention: half of what the vessel's motion meets",
     )
+    most_percentage: float = threshold(
+        10.0,
+        "times the mean damping",
+        "constant force beyond which its size is given as many times that",
+        "convention: damping that is next to nothing makes any number",
+    )
     free_run_worsening: float = threshold(
         0.05,
         "of the base model's error",
