@@ -67,7 +67,7 @@ def general_warnings(settings: FitSettings, known: Excitation, scores: ModelScor
     if np.isfinite(known.heading_coverage) and known.heading_coverage < 0.5:
         warnings.append(
             f"Headings cover only {100.0 * known.heading_coverage:.0f} % of the compass: a steady wind or current could not be "
-            "separated from the hull."
+            "separated from the hull: do not rely on one that is estimated."
         )
     if known.undetermined:
         terms = list(known.undetermined)
@@ -104,6 +104,11 @@ def _axis_warnings(scores: ModelScores) -> list[str]:
     return warnings
 
 
+def _beside(ratio: float) -> str:
+    """Return how large something is beside another, which follows: no percentage where the other is next to nothing."""
+    return f"{100.0 * ratio:.0f} % of" if ratio <= IDENTIFY.most_percentage else "many times"
+
+
 def rest_warnings(force: Callable[[Floats], Floats], visited: Floats) -> tuple[str, ...]:
     """Say where a model is driven by a constant force that counts beside its damping: without thrust it does not stay at rest.
 
@@ -121,7 +126,7 @@ def rest_warnings(force: Callable[[Floats], Floats], visited: Floats) -> tuple[s
     usual = np.array([float(np.mean(np.abs(one))) for one in alone])
     drives = [
         f"{-constant[k]:.3g} {'N·m' if axis == 'yaw' else 'N'} in {axis} "
-        f"({100.0 * abs(constant[k]) / usual[k]:.0f} % of the mean damping)"
+        f"({_beside(abs(constant[k]) / usual[k])} the mean damping)"
         for k, axis in enumerate(AXES)
         if abs(constant[k]) > IDENTIFY.constant_share * usual[k] > 0.0
     ]

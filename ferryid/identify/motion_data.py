@@ -15,6 +15,7 @@ from ferryid.identify.excitation import assess_excitation, still_axes, still_war
 from ferryid.identify.fit_data import Coefficients, Estimate, FitData
 from ferryid.identify.fit_warnings import fit_warnings
 from ferryid.identify.inertia import axes_without_force
+from ferryid.identify.judged_split import judged_by_force
 from ferryid.identify.outcome import Excitation, LogFit
 from ferryid.identify.prediction_windows import PredictionWindows
 from ferryid.identify.ratio_interval import LogErrors, ratio_interval
@@ -192,8 +193,7 @@ class LogData(MotionData):
 
     def scores(self, found: Coefficients, logs: Sequence[LogFit]) -> ModelScores:
         """Return prediction errors in windows; force errors for the thesis's estimator by its own criterion."""
-        thesis = self.settings.estimator == "derivative" and self.settings.accept == "thesis"
-        if thesis or sum(len(one) for one in self.windows.judged) < IDENTIFY.fewest_judged:
+        if self.settings.by_thesis or sum(len(one) for one in self.windows.judged) < IDENTIFY.fewest_judged:
             return super().scores(found, logs)
         return self.windows.scores(found)
 
@@ -248,8 +248,16 @@ class LogData(MotionData):
             )
             known = np.array([1.0, 0.0 if self.settings.reduced else 1.0, 1.0])
             faint = faint_force(force * known, needed, f"the profile {self.profile.name}")
+        unjudged = ""
+        if (
+            self.held_out
+            and self.split.kind != "every-kth"
+            and scores.measure == "force"
+            and not self.settings.by_thesis
+        ):
+            unjudged = judged_by_force(self.split, self.motions, self.profile)
         return (
-            *filter(None, [faint]),
+            *filter(None, [faint, unjudged]),
             *still_warnings(self.profile, self.motions),
             *averaged_out(self.profile, self.motions).says,
             *fit_warnings(self.settings, self.split, excitation, self.prepared, self.motions, scores),

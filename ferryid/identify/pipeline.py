@@ -24,6 +24,7 @@ from ferryid.identify.force_signs import refuse_reversed_forces
 from ferryid.identify.free_run_checks import free_run_checks
 from ferryid.identify.held_out_checks import held_out_checks, skill_checks
 from ferryid.identify.inputs import usable_logs
+from ferryid.identify.judged_split import judged_split
 from ferryid.identify.log_sums import folds_by_blocks, force_free_axes, sum_log
 from ferryid.identify.model_selection import Selection, select_model, windows_to_try
 from ferryid.identify.motion_data import LogData, numbered_names, prepared_data
@@ -33,7 +34,7 @@ from ferryid.identify.physical_checks import law_of, physical_checks
 from ferryid.identify.rows import basis_for
 from ferryid.identify.settings import TEST_WINDOW_S, FitSettings, check_components
 from ferryid.identify.sign_changes import sign_changes
-from ferryid.identify.split import Split, TooShort, split_rows
+from ferryid.identify.split import Split, TooShort
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.weak_data import WeakData, weak_data
 from ferryid.identify.window_length import with_best_length
@@ -174,7 +175,7 @@ def estimator_for(opened: Sequence[Opened], profile: Profile, settings: FitSetti
 def _split(data: LogData, undecided: str) -> Split:
     """Return which rows train and validate; a refusal of logs that are too short says what else they leave undecided."""
     try:
-        return split_rows(data.motions, data.settings.split, window_s=data.settings.window_s)
+        return judged_split(data.motions, data.profile, data.settings, data.settings.window_s)
     except TooShort as error:
         raise TooShort(with_sentence(error, undecided)) from error
 
@@ -361,7 +362,7 @@ def _select_window(profile: Profile, settings: FitSettings, opened: Sequence[Ope
     motions = numbered_names([smooth_measured(one.measured, TEST_WINDOW_S) for one in opened])
     functions = basis_for(settings, motions)
     check_components(settings.components, functions)
-    parts = split_rows(motions, settings.split, window_s=max(TEST_WINDOW_S, *windows_s))
+    parts = judged_split(motions, profile, settings, max(TEST_WINDOW_S, *windows_s))
     choice = _select(profile, settings, functions, opened, windows_s, parts.training)
     return replace(settings, window_s=choice.window_s, components=choice.components), parts
 

@@ -163,6 +163,11 @@ class FitSettings:
         """Whether sway is not measured, so that surge and yaw alone are fitted and judged."""
         return self.axes == WITHOUT_SWAY
 
+    @property
+    def by_thesis(self) -> bool:
+        """Whether the thesis's estimator is judged by its own criterion: force errors, row by row."""
+        return self.estimator == "derivative" and self.accept == "thesis"
+
     def plain(self) -> dict[str, Any]:
         """Return the settings as plain values for a model file."""
         plain = {key: value for key, value in asdict(self).items() if key not in self.scale}

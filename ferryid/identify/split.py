@@ -68,6 +68,7 @@ def split_rows(
     window_s: float,
     guard_s: float = IDENTIFY.guard_s,
     blocks: int | None = None,
+    shortest_s: float = 0.0,
     every: int = EVERY,
     validate: Sequence[str] = (),
 ) -> Split:
@@ -89,6 +90,8 @@ def split_rows(
         Number of blocks a log; None takes as many as are `IDENTIFY.block_s` long, 9 to 36 of them. Fewer where
         blocks would be shorter than four purge gaps. Among several logs, one too short for three blocks is a block
         itself, and of such logs the second, fifth ... validate.
+    shortest_s
+        Least length of a block [s], where that is longer.
     every
         k of ``"every-kth"``, 2 or more.
     validate
@@ -102,7 +105,7 @@ def split_rows(
     if not motions:
         raise FerryIdError("split: there is no log to divide, found none. Fix: give at least one log")
     if kind == "blocks":
-        return _blocks(motions, window_s, guard_s, blocks)
+        return _blocks(motions, window_s, guard_s, blocks, shortest_s)
     if kind == "logs":
         return _logs(motions, validate)
     if kind == "every-kth":
@@ -172,17 +175,16 @@ def _purge(used: Flags, validates: Flags, purge: int) -> tuple[Flags, Flags]:
     return used & ~validates & ~near, validation
 
 
-def _blocks(motions: Sequence[Motion], window_s: float, guard_s: float, blocks: int | None) -> Split:
+def _blocks(motions: Sequence[Motion], window_s: float, guard_s: float, blocks: int | None, shortest_s: float) -> Split:
     training, validation, notes, purges = [], [], [], []
     short = 0
     for motion in motions:
         purge_s = purge_seconds(motion.rate_hz, window_s, guard_s)
         seconds = np.count_nonzero(motion.valid) / motion.rate_hz
-        number = block_number(seconds, purge_s, blocks)
+        least_s = max(IDENTIFY.block_purges * purge_s, shortest_s)
+        number = min(block_number(seconds, purge_s, blocks), int(seconds / least_s))
         if number < 3 and len(motions) == 1:
-            raise _too_short(
-                motion, motion.valid, 3 * IDENTIFY.block_purges * purge_s, "three blocks and the gaps between them"
-            )
+            raise _too_short(motion, motion.valid, 3 * least_s, "three blocks and the gaps between them")
         if number < 3:
             # A log too short for blocks of its own is one block among those of its kind.
             validates = np.full(motion.valid.size, short % IDENTIFY.validates_every == 1)

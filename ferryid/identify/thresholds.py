@@ -70,6 +70,12 @@ class IdentifyThresholds:
     block_purges: float = threshold(
         4.0, "purge gaps", "least length of a block", "convention: more rows are used than purged"
     )
+    block_windows: float = threshold(
+        2.0,
+        "windows",
+        "least length of a block where the usual ones are too short to judge a model in",
+        "convention: two windows that share nothing",
+    )
     window_stretches: float = threshold(
         10.0,
         "windows",
@@ -130,6 +136,12 @@ class IdentifyThresholds:
         "of the mean damping",
         "constant force on an axis from which a warning says that the model does not stay at rest",
         "convention: half of what the vessel's motion meets",
+    )
+    most_percentage: float = threshold(
+        10.0,
+        "times the mean damping",
+        "constant force beyond which its size is given as many times that",
+        "convention: damping that is next to nothing makes any number",
     )
     free_run_worsening: float = threshold(
         0.05,

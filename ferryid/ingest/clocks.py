@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ferryid.counts import counted, verb
 from ferryid.ingest.log import Series
 from ferryid.ingest.many_rows import of_each
+from ferryid.ingest.rounded_times import unrounded
 from ferryid.ingest.stamp_clock import CONSTANT_OFFSET_NS, SECOND_NS, STEP_NS, ClockFacts, compare_clocks, spread_sample
 from ferryid.ingest.stray_times import stray_times
 from ferryid.types import Nanoseconds
@@ -180,8 +181,11 @@ def _one_topic(
     """Repair one topic, its stamps not yet shifted to the recorder's base."""
     receive = np.ascontiguousarray(receive_ns, dtype=np.int64)
     if stamp_ns is None:
-        note = f'times are those of its time column "{time_column}"' if time_column else "no header: receive times only"
-        return _ordered(receive, "receive", (note,), drop_far_side=True)
+        if not time_column:
+            return _ordered(receive, "receive", ("no header: receive times only",), drop_far_side=True)
+        receive, rounded = unrounded(receive)
+        notes = (f'times are those of its time column "{time_column}"', *filter(None, [rounded]))
+        return _ordered(receive, "receive", notes, drop_far_side=True)
     stamp = np.ascontiguousarray(stamp_ns, dtype=np.int64)
     reason, notes, stamp, facts = compare_clocks(receive, stamp)
     if reason:

@@ -40,6 +40,7 @@ NO_DECISION = {
         draft.servo_functions _STEERING _THROTTLE _LEFT _RIGHT _BOAT _RELAY
         draft.actuators USUAL_PULSES_US
         diagnose.checks.kinematics SCALE ANGLE X Y LATE NORTH EAST NEUTRAL
+        diagnose.checks.heading_rounding AROUND SAME_RAD
         diagnose.checks.yaw_rate_scale NEUTRAL SIZE
         diagnose.data.measurements CHANNELS
         diagnose.second_sources.fit SCALE ANGLE X Y LATE BIAS BIAS_2 NEUTRAL OF_VECTORS OF_SCALARS FLOORS

@@ -52,6 +52,14 @@ def test_an_axis_that_errs_more_than_its_mean_is_told_beside_the_base_model() ->
     assert yaw.endswith("Do not rely on the model there.")
 
 
+def test_too_few_headings_leave_a_wind_that_is_estimated_in_doubt() -> None:
+    force = ForceScores.of(np.ones(3), np.full(3, 0.1), np.full(3, 2.0))
+    few = Excitation(np.ones(3), {}, 0.33, {}, np.ones(3))
+    (told,) = general_warnings(FitSettings(), few, ModelScores(force, 100, 500.0, "blocks", ()), 1)
+    assert told.startswith("Headings cover only 33 % of the compass: a steady wind or current could not be separated")
+    assert told.endswith("do not rely on one that is estimated.")
+
+
 def test_an_axis_that_errs_more_than_a_constant_velocity_is_told_with_both_errors() -> None:
     force = ForceScores.of(np.array([0.4, 4.0, 1.2]), np.array([0.01, 0.04, 0.09]), np.ones(3))
     nothing = Excitation(np.ones(3), {}, 1.0, {}, np.ones(3))
@@ -77,6 +85,8 @@ def test_a_constant_force_that_counts_beside_the_damping_is_said_with_axis_and_s
         "a constant force of 24 N in surge (60 % of the mean damping) and 5.1 N·m in yaw (51 % of the mean damping):"
         in one
     )
+    (one,) = rest_warnings(lambda nu: np.asarray(nu * [2.0, 50.0, 100.0] + [-24.0, 0.0, 0.0]), visited)
+    assert "a constant force of 24 N in surge (many times the mean damping):" in one
     assert rest_warnings(lambda nu: 40.0 * nu, visited) == ()
     assert rest_warnings(force, visited[2:]) == ()
 

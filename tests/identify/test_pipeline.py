@@ -53,6 +53,20 @@ def test_a_factor_that_is_hardly_there_is_refused(factor: str, value: float) -> 
 
 
 @pytest.mark.slow
+def test_a_fit_that_force_errors_judge_says_so(monkeypatch: pytest.MonkeyPatch, opened: Opened) -> None:
+    def told(length_m: float) -> tuple[str, list[str]]:
+        profile = replace(PROFILE, hull=replace(PROFILE.hull, length_m=length_m))
+        monkeypatch.setattr(inputs, "open_track", lambda *_, **__: opened)
+        found = fit_logs(["short.mcap"], profile, SETTINGS, RunContext(Path("nowhere")))
+        return found.scores.measure, [one for one in found.warnings if "The verdict is on force errors" in one]
+
+    measure, (said,) = told(320.0)
+    assert measure == "force"
+    assert said.endswith("Fix: give longer logs.")
+    assert told(1.0) == ("prediction", [])
+
+
+@pytest.mark.slow
 def test_recovers_the_true_inertia_from_a_base_at_forty_percent(
     monkeypatch: pytest.MonkeyPatch, opened: Opened
 ) -> None:

@@ -74,7 +74,7 @@ class Spans:
         return np.asarray(rows @ weight) * self.step_s
 
 
-def spans(measurements: Measurements, needed: Floats) -> tuple[Spans, Floats]:
+def spans(measurements: Measurements, needed: Floats, length_s: float = LENGTH_S) -> tuple[Spans, Floats]:
     """Return the windows in which all of some measurements are finite and usable, and these at `RATE_HZ`.
 
     Parameters
@@ -83,6 +83,8 @@ def spans(measurements: Measurements, needed: Floats) -> tuple[Spans, Floats]:
         Where they come from.
     needed
         Measurements, shape (n, c).
+    length_s
+        Length of a window [s]; longer ones lie farther apart, by as much.
 
     Returns
     -------
@@ -91,17 +93,19 @@ def spans(measurements: Measurements, needed: Floats) -> tuple[Spans, Floats]:
     Floats
         Measurements, zero where not finite, shape (n', c).
     """
-    return spans_of(float(measurements.t[0]), measurements.step_s, measurements.usable, needed)
+    return spans_of(float(measurements.t[0]), measurements.step_s, measurements.usable, needed, length_s)
 
 
-def spans_of(first_s: float, step_s: float, usable: NDArray[np.bool_], needed: Floats) -> tuple[Spans, Floats]:
+def spans_of(
+    first_s: float, step_s: float, usable: NDArray[np.bool_], needed: Floats, length_s: float = LENGTH_S
+) -> tuple[Spans, Floats]:
     """Return the same of columns on any uniform grid, which starts at a time and has a step [s]."""
     every = max(1, round(1.0 / (RATE_HZ * step_s)))
     n = len(needed) // every
     thin = needed[: n * every].reshape(n, every, -1).mean(axis=1)
     good = usable[: n * every].reshape(n, every).all(axis=1) & np.isfinite(thin).all(axis=1)
     dt = step_s * every
-    m = max(8, round(LENGTH_S / dt))
+    m = max(8, round(length_s / dt))
     x = (np.arange(m) + 0.5) / m
     T = m * dt
     sine, cosine = np.sin(pi * x), np.cos(pi * x)
@@ -110,7 +114,7 @@ def spans_of(first_s: float, step_s: float, usable: NDArray[np.bool_], needed: F
     slope = 4.0 * sine**3 * cosine * (pi / T)
     bend = (12.0 * sine**2 * cosine**2 - 4.0 * sine**4) * (pi / T) ** 2
     until = np.concatenate([[0], np.cumsum(good)])
-    stride = max(1, round(STRIDE_S / dt))
+    stride = max(1, round(STRIDE_S * length_s / LENGTH_S / dt))
     starts = np.arange(0, n - m + 1, stride, dtype=np.int64)
     starts = starts[until[starts + m] - until[starts] == m]
     middle_s = first_s + (starts + 0.5 * m) * dt - 0.5 * step_s

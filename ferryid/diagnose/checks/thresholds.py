@@ -79,6 +79,12 @@ class CheckThresholds:
     least_rate_scale: float = threshold(
         0.02, "-", "least error of a yaw rate's scale", "convention: above the scale error of a low-cost gyro"
     )
+    rounding_share: float = threshold(
+        0.01,
+        "of the variance of the yaw rate",
+        "that rounding of the heading may have at most; windows are longer otherwise",
+        "derived: it lowers the scale of the yaw rate by as much, half of the least error of that",
+    )
     part_freedom: int = threshold(
         4,
         "-",

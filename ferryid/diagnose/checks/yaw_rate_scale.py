@@ -3,6 +3,10 @@
 The factor is known to a per cent after ten minutes; what takes most of that is how well its error is known. Only turns tell of
 the factor, and they are few, so that an error from the scatter between them is poor. What is left over is alike throughout,
 but for a part that may grow with the rate: with that its whole length tells of the error.
+
+Headings that are rounded are errors in the regressor: in slow turns they step now and then, and stand still between. Windows
+are made as long as it takes for that to be small beside the turns, and what rounding can make of a window is no outlier:
+without those that hold a step, standing headings would be left, as if the vessel had turned less.
 """
 
 from __future__ import annotations
@@ -13,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ferryid.diagnose.checks.check import Check, Lasting, SensorFinding, mapped, rescaled
+from ferryid.diagnose.checks.heading_rounding import rounding_steps
 from ferryid.diagnose.checks.regression import Solution, independence, step
 from ferryid.diagnose.checks.spans import LENGTH_S, STRIDE_S, Spans, least_off, spans
 from ferryid.diagnose.checks.thresholds import CHECKS
@@ -64,18 +69,18 @@ def compared(measurements: Measurements) -> Rates | None:
     """
     if "r" in measurements.slopes:
         return None
-    problem, both = spans(measurements, np.column_stack([measurements.psi, measurements.nu_raw[:, 2]]))
-    if len(problem.starts) < 8:
+    windows = _windows(measurements)
+    if windows is None:
         return None
-    rate, bend, measured = problem.rate(both[:, 0]), problem.curvature(both[:, 0]), problem.mean(both[:, 1])
-    if np.std(rate) < CHECKS.slow_radps:
-        return None
+    problem, heading, measured, rounded = windows
+    rate, bend = problem.rate(heading), problem.curvature(heading)
     J = -np.column_stack([rate, np.ones_like(rate), -bend])
     first = _step(J, J, measured, problem)
     if first is None:
         return None
     left = np.abs(measured + J @ first.values)
-    kept = left <= CHECKS.outlier * max(float(np.median(left)), 1e-9)
+    # An error of half a step to one side, then to the other, is the most that rounding makes: that times all of |w'|.
+    kept = left <= CHECKS.outlier * max(float(np.median(left)), 1e-9) + rounded * float(problem.weight.max())
     problem, J, rate, measured = problem.only(kept), J[kept], rate[kept], measured[kept]
     solved = _step(J, J, measured, problem)
     Z = np.column_stack([-measured, J[:, 1:]])
@@ -83,6 +88,24 @@ def compared(measurements: Measurements) -> Rates | None:
     if solved is None or other is None:
         return None
     return Rates(solved, float(other.values[0]), problem.middle_s, rate, measured)
+
+
+def _windows(measurements: Measurements) -> tuple[Spans, Floats, Floats, Floats] | None:
+    """Return windows, headings, and of every window mean yaw rate and step of the heading; None with too little of them."""
+    steps = rounding_steps(measurements.psi)
+    needed = np.column_stack([measurements.psi, measurements.nu_raw[:, 2], steps])
+    length_s = LENGTH_S
+    while True:
+        problem, columns = spans(measurements, needed, length_s)
+        if len(problem.starts) < 8:
+            return None
+        rate = problem.rate(columns[:, 0])
+        if np.std(rate) < CHECKS.slow_radps:
+            return None
+        rounded = problem.mean(columns[:, 2])
+        if np.mean((rounded / length_s) ** 2) <= CHECKS.rounding_share * np.var(rate):
+            return problem, columns[:, 0], problem.mean(columns[:, 1]), rounded
+        length_s *= 2.0
 
 
 def corrected(measurements: Measurements, factor: float) -> Measurements:

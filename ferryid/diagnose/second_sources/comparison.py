@@ -26,7 +26,7 @@ from ferryid.diagnose.second_sources.explanations import (
     describe_steps,
     describe_wraps,
 )
-from ferryid.diagnose.second_sources.first_guess import Guess, axes_of, first_guess
+from ferryid.diagnose.second_sources.first_guess import Guess, axes_of, first_guess, nearest_unit
 from ferryid.diagnose.second_sources.fit import ANGLE, BIAS, BIAS_2, LATE, SCALE, Fitted, X, Y, fit
 from ferryid.diagnose.second_sources.pairs import PSI, Pair, pair_of
 from ferryid.diagnose.second_sources.samples import Samples
@@ -268,7 +268,9 @@ def _scale(guess: Guess, fitted: Fitted) -> Difference | None:
     size = abs(guess.setting.gain)
     factor = _scaled(fitted.interval(SCALE), size, "-")
     rest = Estimate(*fitted.interval(SCALE), "-") if certain and guess.unit else None
-    return Difference("scale", {"factor": factor}, describe_scale(factor, guess.unit, rest))
+    # What looked like no unit at first may turn out to be near one.
+    near = "" if guess.unit else nearest_unit(factor.value, guess.setting.kind)
+    return Difference("scale", {"factor": factor}, describe_scale(factor, guess.unit, rest, near))
 
 
 def _scaled(interval: tuple[float, float, float], scale: float, unit: str) -> Estimate:

@@ -63,8 +63,8 @@ def describe_quarter_turn(quarter: int, sign: float) -> str:
     )
 
 
-def describe_scale(factor: Estimate, unit: str, rest: Estimate | None) -> str:
-    """Return a factor, the unit that explains it, and what is left beside that."""
+def describe_scale(factor: Estimate, unit: str, rest: Estimate | None, near: str = "") -> str:
+    """Return a factor, the unit that explains it, and what is left beside that; else what unit's it is near, if any's."""
     text = f"factor {shown(factor)}"
     if unit.startswith("1/"):
         name = NAMES.get(unit[2:], unit[2:])
@@ -75,7 +75,7 @@ def describe_scale(factor: Estimate, unit: str, rest: Estimate | None) -> str:
         for value, reason in CONSTANTS.items():
             if abs(factor.value - value) <= 0.5 * (factor.high - factor.low) < SECOND.constant_width * abs(value - 1.0):
                 return f"{text}: {reason}"
-        return text
+        return f"{text}, near {near}" if near else text
     return text if rest is None else f"{text}, and {shown(rest)} beside it"
 
 

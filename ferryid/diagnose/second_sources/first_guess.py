@@ -10,6 +10,7 @@ import numpy as np
 
 from ferryid.diagnose.checks.spans import RATE_HZ
 from ferryid.diagnose.checks.thresholds import CHECKS
+from ferryid.diagnose.second_sources.explanations import NAMES
 from ferryid.diagnose.second_sources.fit import VECTORS, Complex, Setting, complex_of, lever_of, source_of
 from ferryid.diagnose.second_sources.pairs import Pair
 from ferryid.diagnose.second_sources.thresholds import SECOND
@@ -107,6 +108,12 @@ def _unit(size: float, kind: str) -> tuple[float, str, bool]:
     if abs(log(size / nearest[0])) < log(SECOND.unit_ratio):
         return nearest[0], nearest[1], True
     return size, "", False
+
+
+def nearest_unit(size: float, kind: str) -> str:
+    """Return factor and name of the unit that a factor is near to, for a signal of a kind; empty where there is none."""
+    value, name, _ = _unit(size, UNIT_KIND[kind])
+    return "" if not name or name.startswith("1/") else f"{value:.4g} of {NAMES.get(name, name)}"
 
 
 def _best_delay(setting: Setting, pairs: Sequence[Pair]) -> tuple[float, float, complex] | None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ferryid.diagnose.checks.heading_rounding import rounding_steps
 from ferryid.diagnose.checks.yaw_rate_scale import find
 from ferryid.effects.force_model import Measurements
 from ferryid.simulate import load_scenario
@@ -49,3 +50,60 @@ def test_an_error_that_grows_with_the_rate_widens_the_interval() -> None:
     assert wide is None or wide.parameters["factor"].high - wide.parameters["factor"].low > 1.3 * (
         even.parameters["factor"].high - even.parameters["factor"].low
     )
+
+
+def ship(factor: float, digits_deg: float, seed: int, *, circle: bool) -> Measurements:
+    """Return a ship that turns at tenths of a degree a second: a circle that slows down, or slow turns to either side."""
+    t = 0.1 * np.arange(24_000)
+    rng = np.random.default_rng(seed)
+    slow = 0.45 * (1.0 - 0.87 * np.clip((t - 1500.0) / 100.0, 0.0, 1.0))
+    r = np.radians(slow if circle else 0.4 * np.sin(2.0 * np.pi * t / 400.0))
+    psi = np.cumsum(r) * 0.1
+    read = psi if digits_deg == 0.0 else np.radians(digits_deg * np.round(np.degrees(psi) / digits_deg))
+    zero = np.zeros_like(t)
+    nu = np.column_stack([zero + 8.0, zero, factor * r + 2e-5 * rng.standard_normal(len(t))])
+    eta = np.column_stack([zero, zero, read])
+    return Measurements(
+        PROFILE, t, eta, nu, nu, np.zeros((len(t), 2, 3)), np.zeros((len(t), 2)), np.ones(len(t), dtype=np.bool_)
+    )
+
+
+@pytest.mark.parametrize("digits_deg", [1.0, 0.1, 0.0])
+@pytest.mark.parametrize("circle", [True, False])
+def test_a_rounded_heading_is_no_scale_of_the_yaw_rate(digits_deg: float, circle: bool) -> None:
+    assert find(ship(1.0, digits_deg, 1, circle=circle)) is None
+    finding = find(ship(0.95, digits_deg, 1, circle=circle))
+    assert finding is not None
+    factor = finding.parameters["factor"]
+    assert factor.low <= 0.95 <= factor.high
+    assert factor.high - factor.low < 0.02
+
+
+def test_steps_of_a_rounded_heading() -> None:
+    ramp = np.radians(np.concatenate([np.arange(0.0, 20.0, 0.01), np.arange(20.0, 40.0, 0.01)]))
+    whole, tenths = (np.radians(size * np.round(np.degrees(ramp) / size)) for size in (1.0, 0.1))
+    assert rounding_steps(whole)[300:-300] == pytest.approx(np.radians(1.0))
+    mixed = rounding_steps(np.concatenate([tenths[:2000], whole[2000:]]))
+    assert np.median(mixed[:1900]) == pytest.approx(np.radians(0.1))
+    assert np.median(mixed[2300:]) == pytest.approx(np.radians(1.0))
+    assert not rounding_steps(ramp).any(), "moves from row to row"
+    noise = ramp + 1e-4 * np.random.default_rng(1).standard_normal(len(ramp))
+    noise[1::50] = noise[::50]
+    assert not rounding_steps(noise).any(), "repeats a value now and then, and moves between"
+    jumped = whole.copy()
+    jumped[2000:] += 0.5
+    assert rounding_steps(jumped).max() == pytest.approx(np.radians(1.0)), "a jump is no rounding"
+    assert not rounding_steps(np.zeros(1)).any()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("digits_deg", [1.0, 0.1])
+def test_trials_with_rounded_headings(seed: int, digits_deg: float) -> None:
+    for factor in (0.95, 1.0):
+        measurements = sailed(seed, factor)
+        rounded = np.radians(digits_deg * np.round(np.degrees(measurements.psi) / digits_deg))
+        finding = find(replace(measurements, eta=np.column_stack([measurements.eta[:, :2], rounded])))
+        assert (finding is None) == (factor == 1.0)
+        if finding is not None:
+            assert finding.parameters["factor"].low <= 0.95 <= finding.parameters["factor"].high

@@ -8,8 +8,11 @@ from functools import cache
 import numpy as np
 import pytest
 
+from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.second_sources.candidates import Candidate
 from ferryid.diagnose.second_sources.comparison import Comparison, compare
+from ferryid.diagnose.second_sources.explanations import describe_scale
+from ferryid.diagnose.second_sources.first_guess import nearest_unit
 from ferryid.diagnose.second_sources.samples import Samples
 from ferryid.effects.force_model import Measurements
 from ferryid.types import Floats
@@ -257,3 +260,12 @@ def test_short_logs_of_a_campaign_count_together() -> None:
     place = only(found, "place")
     holds(place["x"], 1.0, 0.6)
     holds(place["y"], -2.0, 0.6)
+
+
+def test_a_factor_that_looked_like_no_unit_names_the_one_that_it_is_near() -> None:
+    factor = Estimate(1.909, 1.885, 1.933, "-")
+    near = nearest_unit(factor.value, "speed")
+    assert describe_scale(factor, "", None, near) == "factor 1.909 ± 0.024, near 1.944 of knots"
+    assert describe_scale(factor, "", None) == "factor 1.909 ± 0.024"
+    assert [nearest_unit(size, "speed") for size in (1.0, 1.2, 1.6, 0.514)] == [""] * 4
+    assert nearest_unit(2.0, "heading") == ""

@@ -1,0 +1,82 @@
+"""Times of a table that were written with too few digits, so that rows share the time of others.
+
+Three digits are hundredths of a second at first, tenths from 10 s on, and whole seconds from 100 s on: of an even log of seven
+rows a second, six of seven would be left out. Rows that lie evenly within the rounding of every time are put back; nothing else
+is, as rows may share a time because they were written twice.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ferryid.types import Floats, Nanoseconds
+
+_SHARED = 0.1
+"""Share of the rows that repeat a time from which on rounding is asked for."""
+_STEPS = 8
+"""Steps of the times in a row of which the rounding is the largest common divisor."""
+_SECOND_NS = 1e9
+
+
+def unrounded(times: Nanoseconds) -> tuple[Nanoseconds, str]:
+    """Return times of rows that lie evenly, where that is what was rounded, and what to say of it.
+
+    Parameters
+    ----------
+    times
+        Times of a table in the order of its rows [ns], shape (n,).
+
+    Returns
+    -------
+    tuple
+        Strictly rising times, or those given; and a sentence, empty where times are not that coarse.
+    """
+    steps = np.diff(times)
+    fresh = np.concatenate([[True], steps > 0])
+    repeats = len(times) - int(np.count_nonzero(fresh))
+    if repeats < _SHARED * len(times) or np.any(steps < 0):
+        return times, ""
+    distinct = times[fresh]
+    if len(distinct) <= 2 * _STEPS:
+        return times, ""
+    rounding = _rounding(distinct)[np.cumsum(fresh) - 1]
+    start, period = _line(times, rounding)
+    even = start + period * np.arange(len(times))
+    within = bool(np.all(np.abs(times - times[0] - even) <= 0.55 * rounding + 0.5 * period))
+    coarse = rounding[1:][steps == 0]
+    if np.median(coarse) < period:
+        return times, ""
+    size = _sizes(coarse)
+    what = f"{repeats} of {len(times)} rows repeat the time of another, as times that are rounded to {size} s do"
+    pace = f"evenly {period / _SECOND_NS:.4g} s apart ({_SECOND_NS / period:.3g} Hz)"
+    counts = np.diff(np.flatnonzero(np.concatenate([fresh, [True]])))[1:-1]
+    if within and counts.min() < counts.max():
+        moved = float(np.abs(times - times[0] - even).max()) / _SECOND_NS
+        return (
+            times[0] + np.rint(even).astype(np.int64),
+            f"{what}: all rows are put {pace}, at most {moved:.2g} s from their times, which fits the rounding of each",
+        )
+    doubt = f"they may lie {pace}, or have been written twice" if within else "the rows do not lie evenly"
+    return times, f"{what}, and are left out: {doubt}. Fix: write the times with more digits"
+
+
+def _rounding(distinct: Nanoseconds) -> Floats:
+    """Return what each of rising times is rounded to [ns]: the divisor of the steps behind it or before it, shape (n,)."""
+    windows = np.lib.stride_tricks.sliding_window_view(np.diff(distinct), _STEPS)
+    divisor = np.gcd.reduce(windows, axis=1).astype(np.float64)
+    ahead = np.concatenate([divisor, np.full(_STEPS, divisor[-1])])
+    behind = np.concatenate([np.full(_STEPS, divisor[0]), divisor])
+    return np.asarray(np.maximum(ahead, behind))
+
+
+def _line(times: Nanoseconds, rounding: Floats) -> tuple[float, float]:
+    """Return start, from the first time on, and period [ns] of rows that lie evenly, the more by a time the finer it is."""
+    row = np.arange(len(times), dtype=np.float64)
+    columns = np.column_stack([np.ones_like(row), row]) / rounding[:, None]
+    start, period = np.linalg.lstsq(columns, (times - times[0]) / rounding, rcond=None)[0]
+    return float(start), float(period)
+
+
+def _sizes(rounding: Floats) -> str:
+    low, high = (f"{size / _SECOND_NS:.3g}" for size in (rounding.min(), rounding.max()))
+    return low if low == high else f"{low} to {high}"
