@@ -58,6 +58,7 @@ NO_DECISION = {
         diagnose.inference.campaign_estimation SCALE_GAPS
         diagnose.inference.group_differences SCATTERS
         effects.shallow_water EDGE_M
+        effects.thruster_gain LEAST_LEVEL
         effects.thruster_interaction SQUARINGS
         effects.dead_band RISE SIZE LARGEST DIRECT_MPS2 DIRECT_LARGEST_MPS2
         effects.external_push USUAL_MPS2 ARM
