@@ -79,7 +79,7 @@ def inertia_checks(profile: Profile, mass: Floats, spans: Floats | None = None) 
                 )
             else:
                 told = f" {told}." if told else ""
-                admits = f", {least / high:.2g} {_UNITS[number]} or more to admit that much" if told else ""
+                admits = f", more than {least / high:.2g} {_UNITS[number]} to admit that much" if told else ""
                 meaning = (
                     "it is held at that bound, and the data would have more, which no hull has: the applied force may be "
                     f"too large or of the wrong sign{small}, or the actuators were not engaged.{told} Fix: in the profile, "
