@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from ferryid.identify.feasible import Feasible
 from ferryid.identify.log_condition import KindOutcome, LogCondition
 from ferryid.identify.outcome import ArchivedLog, Excitation, LogFit, LogWind
@@ -136,6 +138,11 @@ class FitData(ABC):
     def feasible(self, coefficients: Floats, mask: Flags) -> Feasible | None:
         """Return the coefficients nearest to estimated ones, (K, 3), that physics allows; None: they stay as they are."""
         return None
+
+    @property
+    def inertia_spans(self) -> Floats:
+        """Between which inertias the truth lies on each axis, shape (3, 2); NaN where nothing is known of it."""
+        return np.full((3, 2), np.nan)
 
     def undivided(self) -> FitData | None:
         """Return the same data of which all rows train, for the coefficients that are stored; None: the training rows' are."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from ferryid.identify.acceptance import Check
 from ferryid.identify.fit_data import Coefficients, FitData
-from ferryid.identify.inertia import largest_inertia, relative_inertia, scaled_eigenvalue
+from ferryid.identify.inertia import largest_inertia, relative_inertia, rigid_body, scaled_eigenvalue
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.models.forces import Estimator, effective_mass
 from ferryid.types import AXES, Floats
@@ -17,12 +17,26 @@ from ferryid.vessel.profile import Profile
 MOST_ROWS = 10_000
 """Rows at which damping is evaluated; of more, evenly spaced ones."""
 _ALONE = ("u", "v", "r")
+_UNITS = ("kg", "kg", "kg·m²")
 _ROUNDING = 1e-3
 """Part of a bound within which an inertia is at it."""
 
 
-def inertia_checks(profile: Profile, mass: Floats) -> tuple[Check, ...]:
-    """Return whether an effective mass matrix, shape (3, 3), is one that a hull can have."""
+def inertia_checks(profile: Profile, mass: Floats, spans: Floats | None = None) -> tuple[Check, ...]:
+    """Return whether an effective mass matrix, shape (3, 3), is one that a hull can have.
+
+    An inertia at its upper bound counts against a model unless the data leave open whether it is below.
+
+    Parameters
+    ----------
+    profile
+        The vessel.
+    mass
+        The matrix.
+    spans
+        Between which inertias the truth lies on each axis, shape (3, 2); NaN or None where nothing is known of it.
+    """
+    spans = np.full((3, 2), np.nan) if spans is None else spans
     smallest = scaled_eigenvalue(profile, mass)
     says = f"The smallest eigenvalue of the effective mass matrix is {smallest:.3g} of the rigid body's and must be above 0"
     checks = [
@@ -44,7 +58,7 @@ def inertia_checks(profile: Profile, mass: Floats) -> tuple[Check, ...]:
         # Only the upper bound counts against a model: noise takes some inertia, but nothing gives that much of it.
         coupled = number == of_axis and largest > high * (1.0 - _ROUNDING) >= share
         at_most = coupled or share > high * (1.0 - _ROUNDING)
-        possible = lowest <= share and not at_most
+        possible: bool | None = lowest <= share and not at_most
         if low * (1.0 + _ROUNDING) < share and not at_most:
             meaning = "it is possible"
         elif at_most and (largest if coupled else share) <= highest:
@@ -54,11 +68,24 @@ def inertia_checks(profile: Profile, mass: Floats) -> tuple[Check, ...]:
                 if axis == "yaw"
                 else ("", "mass_kg")
             )
-            meaning = (
-                "it is held at that bound, and the data would have more, which no hull has: the applied force may be "
-                f"too large or of the wrong sign{small}, or the actuators were not engaged. Fix: in the profile, correct the "
-                f"unit and sign of the actuators' signals, the thrust curve{',' if small else ' or'} {rest}"
-            )
+            told, least = ("", float("nan")) if coupled else _span(spans[number], axis)
+            rigid = float(np.diag(rigid_body(profile.hull))[number])
+            if told and low * rigid <= least <= high * rigid:
+                possible = None
+                meaning = (
+                    f"it is held at that bound, and the data do not determine it. {told}. Do not rely on it. To narrow it, "
+                    "record thrust that changes often and abruptly, from rest too, or state a shorter window_s at the top of "
+                    "the profile"
+                )
+            else:
+                told = f" {told}." if told else ""
+                admits = f", more than {least / high:.2g} {_UNITS[number]} to admit that much" if told else ""
+                meaning = (
+                    "it is held at that bound, and the data would have more, which no hull has: the applied force may be "
+                    f"too large or of the wrong sign{small}, or the actuators were not engaged.{told} Fix: in the profile, "
+                    f"correct the unit and sign of the actuators' signals, the thrust curve{',' if small else ' or'} {rest}"
+                    f"{admits}"
+                )
         elif possible:
             meaning = "it is held at that bound, beyond which the data would have it"
         elif share < low:
@@ -78,6 +105,19 @@ def inertia_checks(profile: Profile, mass: Floats) -> tuple[Check, ...]:
             )
         )
     return tuple(checks)
+
+
+def _span(span: Floats, axis: str) -> tuple[str, float]:
+    """Return between what an inertia lies, as a sentence, and the least of it; none where force says hardly anything of it."""
+    least, most = span.tolist()
+    if not least >= IDENTIFY.followed * most:
+        return "", float("nan")
+    unit, force = _UNITS[AXES.index(axis)], "moment" if axis == "yaw" else "force"
+    return (
+        f"The {force} explains acceleration with {most:.3g} {unit}, acceleration the {force} with {least:.3g} {unit}, and the "
+        f"truth lies between: where damping balances most of the {force} within the windows, what acts beside it makes the "
+        "inertia look too large"
+    ), least
 
 
 def some_of(visited: Floats) -> Floats:
@@ -160,7 +200,7 @@ def physical_checks(data: FitData, found: Coefficients) -> tuple[Check, ...]:
     """Return whether the inertia and the damping of a fit's coefficients, base model included, can be a hull's."""
     profile, scale, functions = data.profile, data.settings.scale, data.functions
     every = (
-        *inertia_checks(profile, effective_mass(profile, scale, functions.terms, found.theta)),
+        *inertia_checks(profile, effective_mass(profile, scale, functions.terms, found.theta), data.inertia_spans),
         *damping_checks(law_of(data, found).at_constant_velocity, data.visited),
     )
     return tuple(check for check in every if not (data.settings.reduced and check.name.endswith("_sway")))

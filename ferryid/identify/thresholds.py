@@ -35,6 +35,12 @@ class IdentifyThresholds:
         "highest fitted inertia that is accepted",
         "tuned on real recordings: no hull has four times its own as added mass",
     )
+    followed: float = threshold(
+        0.1,
+        "of its variance",
+        "share of acceleration that force explains beside velocity, below which it does not say between what the inertia lies",
+        "convention: actuators that are not engaged explain none",
+    )
     no_force: float = threshold(
         1e-6,
         "of the base model's force",

@@ -20,6 +20,7 @@ from ferryid.identify.contradictions import response_of, signs_of, wrong_size, w
 from ferryid.identify.feasible import Feasible, LiftTie, feasible_gains
 from ferryid.identify.fit_data import Estimate
 from ferryid.identify.inertia import relative_inertia, without_inertia
+from ferryid.identify.inertia_span import inertia_spans
 from ferryid.identify.log_condition import KindOutcome, LogCondition, conditions_json
 from ferryid.identify.log_conditions import Conditions, Start, estimate_conditions
 from ferryid.identify.motion_data import LogData
@@ -563,6 +564,12 @@ class WeakData(LogData):
             ties=self.ties,
             reduced=self.settings.reduced,
         )
+
+    @cached_property
+    def inertia_spans(self) -> Floats:
+        """Between which inertias the truth lies on each axis, shape (3, 2), by the training windows without the prior."""
+        sums = CrossProducts.of(*self.whitened.rows)
+        return inertia_spans(sums, self.functions.terms, self.functions.mask, self.windows.base_mass)
 
     @cached_property
     def information(self) -> Floats:

@@ -58,6 +58,34 @@ def test_an_inertia_in_yaw_at_its_upper_bound_may_be_a_guess_of_the_profile() ->
     assert "k_zz_m" not in checks["inertia_surge"].reason
 
 
+def at_upper_bound_in_yaw(*shares: float) -> Check:
+    """Return the check of an inertia in yaw at its bound, where the data have it between these shares of the rigid body's."""
+    spans = np.full((3, 2), np.nan)
+    spans[2] = RIGID[2, 2] * np.array(shares)
+    checks = inertia_checks(PROFILE, np.diag([1.5, 1.5, 5.0]) @ np.diag(np.diag(RIGID)), spans)
+    return next(one for one in checks if one.name == "inertia_yaw")
+
+
+def test_an_inertia_that_the_data_leave_open_below_its_bound_does_not_reject() -> None:
+    check = at_upper_bound_in_yaw(3.0, 12.0)
+    assert check.passed is None
+    assert "the data do not determine it" in check.reason
+    assert f"acceleration the moment with {3.0 * RIGID[2, 2]:.3g} kg·m², and the truth lies between" in check.reason
+    # A force that hardly shows in the motion at all leaves everything open, and so does a mirrored one.
+    assert at_upper_bound_in_yaw(3.0, 40.0).passed is False
+    assert at_upper_bound_in_yaw(0.5, 4.0).passed is False
+
+
+def test_an_inertia_that_lies_above_its_bound_says_what_the_profile_would_need() -> None:
+    check = at_upper_bound_in_yaw(7.0, 30.0)
+    assert check.passed is False
+    assert "the truth lies between" in check.reason
+    assert check.reason.endswith(
+        f"inertia_z or k_zz_m, more than {7.0 * RIGID[2, 2] / 5.0:.2g} kg·m² to admit that much."
+    )
+    assert "to admit that much" not in at_upper_bound_in_yaw(np.nan, np.nan).reason
+
+
 def test_a_bound_is_met_in_whatever_direction_the_inertia_is_that_large() -> None:
     """Sway and yaw coupled: the diagonal is within its bounds, another direction is at them, as the estimate holds it."""
     root = np.linalg.cholesky(RIGID)

@@ -16,10 +16,14 @@ from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.effects.hull_spread import default_hull_spread
 from ferryid.errors import FerryIdError
 from ferryid.identify import estimators, inputs
+from ferryid.identify import feasible as feasible_module
+from ferryid.identify import physical_checks as physical_checks_module
 from ferryid.identify.contradictions import wrong_way
 from ferryid.identify.estimation import estimate_correction
 from ferryid.identify.feasible import Feasible, _nearest, feasible_gains
+from ferryid.identify.inertia import relative_inertia
 from ferryid.identify.motion_data import compute_residuals
+from ferryid.identify.physical_checks import physical_checks
 from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.split import Split
@@ -158,6 +162,21 @@ def test_without_noise_the_hull_comes_back() -> None:
     assert mass[1, 2] == pytest.approx(mass[2, 1], rel=1e-6)
     width = estimate.coefficients.high - estimate.coefficients.low
     assert np.all(width[BASIS.mask] >= 0.0)
+
+
+def test_an_inertia_at_its_bound_comes_with_what_the_windows_say_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    data = data_of([measured(seed, seconds=400.0) for seed in range(3)])
+    truth = PROFILE.hull.M[2, 2]
+    np.testing.assert_allclose(data.inertia_spans[2], truth, rtol=0.05)
+    # A bound below the truth, which the windows without noise know well.
+    lower = replace(IDENTIFY, most_inertia=0.8 * float(relative_inertia(PROFILE, PROFILE.hull.M)[2]))
+    monkeypatch.setattr(feasible_module, "IDENTIFY", lower)
+    monkeypatch.setattr(physical_checks_module, "IDENTIFY", lower)
+    estimate = estimate_correction(data, K, 0, no_progress)
+    checks = physical_checks(data, data.combined(estimate.coefficients))
+    (check,) = (one for one in checks if one.name == "inertia_yaw")
+    assert check.passed is False
+    assert "the truth lies between" in check.reason
 
 
 def test_a_steady_force_in_one_log_does_not_end_up_in_the_hull() -> None:
