@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ferryid.counts import counted, verb
 from ferryid.types import Floats, Nanoseconds
 
 _SHARED = 0.1
@@ -47,7 +48,8 @@ def unrounded(times: Nanoseconds) -> tuple[Nanoseconds, str]:
     if np.median(coarse) < period:
         return times, ""
     size = _sizes(coarse)
-    what = f"{repeats} of {len(times)} rows repeat the time of another, as times that are rounded to {size} s do"
+    rows = f"{repeats} of {counted(len(times), 'row')} {verb(repeats, 'repeats')}"
+    what = f"{rows} the time of another, as times that are rounded to {size} s do"
     pace = f"evenly {period / _SECOND_NS:.4g} s apart ({_SECOND_NS / period:.3g} Hz)"
     counts = np.diff(np.flatnonzero(np.concatenate([fresh, [True]])))[1:-1]
     if within and counts.min() < counts.max():
