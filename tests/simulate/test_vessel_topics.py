@@ -153,6 +153,14 @@ def test_a_log_is_read_with_the_profile_it_was_simulated_with(trial: Simulation,
     np.testing.assert_allclose(found, truth, atol=0.2)
 
 
+@pytest.mark.parametrize("topic", ["/motors3", "2021-05-11/fix"])
+def test_topics_of_any_names_have_types_of_their_own(trial: Simulation, tmp_path: Path, topic: str) -> None:
+    boat = parse_profile(BOAT.replace('"/gnss/fix"', f'"{topic}"'), "boat.toml")
+    streams, _ = in_vessel_topics(trial.streams, boat)
+    write_log(replace(trial, profile=boat, streams=streams), tmp_path / "t.mcap")
+    assert set(columns(tmp_path / "t.mcap", boat)) >= {"x", "y", "n_thruster1", "n_thruster2"}
+
+
 def test_topics_that_are_the_simulators_stay_as_they_are(trial: Simulation) -> None:
     for profile in (FERRY, load_profile("revolt")):
         simulated = (
