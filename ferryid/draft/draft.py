@@ -293,21 +293,22 @@ def as_order(signal: MappedSignal) -> MappedSignal:
 def with_kind(actuator: DraftedActuator, like: Profile) -> DraftedActuator:
     """Return an actuator of the kind that a profile has it of, with signals of this kind.
 
-    What looks like the speed of an actuator that the profile has as a force is that force; an angle of one that does not turn
-    is none of its signals.
+    What looks like the speed of an actuator that the profile has as a force is that force, unless the log has its force or
+    thrust as well; an angle of one that does not turn is none of its signals.
     """
     twin = next((one for one in like.actuators if one.name == actuator.name), None)
     if twin is None:
         return actuator
     usual = {role for roles in needed_roles(twin) for role in roles}
-    there = {signal.quantity for signal in actuator.signals}
+    roles = {signal.quantity.split(".")[1] for signal in actuator.signals}
+    meant = "thrust" if "thrust" in roles else "speed"
     signals = []
     for signal in actuator.signals:
         role, dot, order = signal.quantity.partition(".")[2].partition(".")
         as_force = f"{actuator.name}.force{dot}{order}"
         if role in usual:
             signals.append(signal)
-        elif twin.kind == "force" and role in ("speed", "thrust") and as_force not in there:
+        elif twin.kind == "force" and role == meant and "force" not in roles:
             shares = ("%", "fraction", "us")
             doubt = f"its field is called a {role}: that it is the force is as in the profile {like.name}"
             signals.append(

@@ -52,7 +52,7 @@ def judged_split(motions: Sequence[Motion], profile: Profile, settings: FitSetti
         return usual
     if _windows(longer.training, motions, length_s) < IDENTIFY.fewest_windows:
         return usual
-    note = f"Blocks are {shortest_s:.3g} s or longer, as predictions are judged in windows of {length_s:.3g} s."
+    note = f"Blocks are {shortest_s:.3g} s or longer, or whole logs, as predictions are judged in windows of {length_s:.3g} s."
     return replace(longer, notes=(*longer.notes, note))
 
 

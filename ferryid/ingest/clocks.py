@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.counts import counted, verb
-from ferryid.ingest.log import Series
+from ferryid.ingest.log import Column, Series
 from ferryid.ingest.many_rows import of_each
 from ferryid.ingest.rounded_times import unrounded
 from ferryid.ingest.stamp_clock import CONSTANT_OFFSET_NS, SECOND_NS, STEP_NS, ClockFacts, compare_clocks, spread_sample
@@ -118,7 +118,7 @@ def repair_all(series: Mapping[str, Series]) -> dict[str, tuple[Nanoseconds, Row
         By topic: strictly rising times [ns], shape (m,); the indices of the rows kept, in that order, shape (m,); the report.
     """
     each = of_each(
-        lambda one: _one_topic(one.receive_ns, one.stamp_ns, one.time_column),
+        lambda one: _one_topic(one.receive_ns, one.stamp_ns, one.time_column, one.columns),
         series.values(),
         sum(len(one.receive_ns) for one in series.values()),
     )
@@ -176,14 +176,17 @@ def _span_text(nanoseconds: int) -> str:
 
 
 def _one_topic(
-    receive_ns: Nanoseconds, stamp_ns: Nanoseconds | None, time_column: str = ""
+    receive_ns: Nanoseconds,
+    stamp_ns: Nanoseconds | None,
+    time_column: str = "",
+    columns: Mapping[str, Column] | None = None,
 ) -> tuple[Nanoseconds, Rows, ClockReport]:
     """Repair one topic, its stamps not yet shifted to the recorder's base."""
     receive = np.ascontiguousarray(receive_ns, dtype=np.int64)
     if stamp_ns is None:
         if not time_column:
             return _ordered(receive, "receive", ("no header: receive times only",), drop_far_side=True)
-        receive, rounded = unrounded(receive)
+        receive, rounded = unrounded(receive, (columns or {}).values())
         notes = (f'times are those of its time column "{time_column}"', *filter(None, [rounded]))
         return _ordered(receive, "receive", notes, drop_far_side=True)
     stamp = np.ascontiguousarray(stamp_ns, dtype=np.int64)

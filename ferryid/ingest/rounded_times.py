@@ -2,30 +2,37 @@
 
 Three digits are hundredths of a second at first, tenths from 10 s on, and whole seconds from 100 s on: of an even log of seven
 rows a second, six of seven would be left out. Rows that lie evenly within the rounding of every time are put back; nothing else
-is, as rows may share a time because they were written twice.
+is, as rows may share a time because they were written twice, or one by each of several sensors.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from ferryid.counts import counted, verb
-from ferryid.types import Floats, Nanoseconds
+from ferryid.ingest.log import Column
+from ferryid.types import Flags, Floats, Nanoseconds
 
 _SHARED = 0.1
 """Share of the rows that repeat a time from which on rounding is asked for."""
 _STEPS = 8
 """Steps of the times in a row of which the rounding is the largest common divisor."""
+_MOST = 0.5
+"""Share of the rows that repeat a time whose values tell that they are no rows of their own."""
 _SECOND_NS = 1e9
 
 
-def unrounded(times: Nanoseconds) -> tuple[Nanoseconds, str]:
+def unrounded(times: Nanoseconds, columns: Iterable[Column] = ()) -> tuple[Nanoseconds, str]:
     """Return times of rows that lie evenly, where that is what was rounded, and what to say of it.
 
     Parameters
     ----------
     times
         Times of a table in the order of its rows [ns], shape (n,).
+    columns
+        What the rows hold, shape (n,) each.
 
     Returns
     -------
@@ -38,13 +45,22 @@ def unrounded(times: Nanoseconds) -> tuple[Nanoseconds, str]:
     if repeats < _SHARED * len(times) or np.any(steps < 0):
         return times, ""
     distinct = times[fresh]
-    if len(distinct) <= 2 * _STEPS:
+    same, other = _compared(columns, len(times))
+    again = steps == 0
+    # A row that was written twice holds the same, and the next one does not; what is held between samples shows in both.
+    if len(distinct) <= 2 * _STEPS or np.mean(same[again]) > max(_MOST, 2.0 * np.mean(same[~again])):
         return times, ""
+    if np.mean(other[again]) > _MOST:
+        what = f"{repeats} of {len(times)} rows repeat the time of another and are left out"
+        return (
+            times,
+            f"{what}: they fill other columns, as rows of several sensors do. Fix: write those of one time as one row",
+        )
     rounding = _rounding(distinct)[np.cumsum(fresh) - 1]
     start, period = _line(times, rounding)
     even = start + period * np.arange(len(times))
     within = bool(np.all(np.abs(times - times[0] - even) <= 0.55 * rounding + 0.5 * period))
-    coarse = rounding[1:][steps == 0]
+    coarse = rounding[1:][again]
     if np.median(coarse) < period:
         return times, ""
     size = _sizes(coarse)
@@ -60,6 +76,18 @@ def unrounded(times: Nanoseconds) -> tuple[Nanoseconds, str]:
         )
     doubt = f"they may lie {pace}, or have been written twice" if within else "the rows do not lie evenly"
     return times, f"{what}, and are left out: {doubt}. Fix: write the times with more digits"
+
+
+def _compared(columns: Iterable[Column], count: int) -> tuple[Flags, Flags]:
+    """Return which rows after the first hold the same as the row before, and which fill other columns, shape (n - 1,) each."""
+    same, other, known = (np.full(max(count - 1, 0), start) for start in (True, False, False))
+    for column in columns:
+        known[:] = True
+        missing = column != column
+        one = column[1:] == column[:-1]
+        same &= one | (missing[1:] & missing[:-1])
+        other |= missing[1:] != missing[:-1]
+    return same & known, other
 
 
 def _rounding(distinct: Nanoseconds) -> Floats:

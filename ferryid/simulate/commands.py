@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from shlex import quote
@@ -11,7 +12,7 @@ import numpy as np
 
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError
-from ferryid.files import replacing
+from ferryid.files import replacing, taken
 from ferryid.models import Model
 from ferryid.models.store import load_file
 from ferryid.simulate.logs import write_log
@@ -22,6 +23,8 @@ from ferryid.simulate.vessel_model import sailed_by
 from ferryid.simulate.vessel_topics import matching_profile
 
 SCHEMA = "ferryid.simulate/1"
+BESIDE = "# Written by ferryid simulate, to read the log that lies beside it.\n"
+"""First line of a profile that is written beside a log: no other file is replaced by one."""
 FASTEST_MPS = 15.0
 FASTEST_DEGPS = 180.0
 
@@ -117,8 +120,17 @@ def _readable(simulation: Simulation, log: Path, *, overwrite: bool) -> list[str
     if not simulation.faults:
         return []
     place = log.with_name(f"{log.stem}.vessel.toml")
+    ours = not os.path.lexists(place) or (place.is_file() and place.read_bytes().startswith(BESIDE.encode()))
+    if not ours:
+        raise FerryIdError(
+            f"{place}: the log needs a profile of that name, which reads it, found another file. Fix: give the log another "
+            "name with --log"
+        )
+    if os.path.lexists(place) and not overwrite:
+        raise taken(place)
     with replacing(place, new=not overwrite) as temporary:
-        temporary.write_text(matching_profile(simulation.streams, simulation.profile), encoding="utf-8")
+        text = matching_profile(simulation.streams, simulation.profile)
+        temporary.write_text(BESIDE + text.removeprefix(BESIDE), encoding="utf-8")
     more = f" ({counted(len(simulation.faults) - 1, 'more such topic')})" if len(simulation.faults) > 1 else ""
     return [
         f"the log has the simulator's own topics, as it cannot have the profile's {simulation.faults[0]}{more}. "

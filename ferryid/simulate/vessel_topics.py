@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, replace
+from itertools import count
 from keyword import iskeyword
 from math import cos, pi, radians, sin, sqrt
 from typing import Any
@@ -75,7 +76,7 @@ def in_vessel_topics(streams: Sequence[Stream], profile: Profile) -> tuple[tuple
             written = [
                 _Written(one, source, _fields(one, _canonical(one, source, own, profile))) for one, source in there
             ]
-            made.append(_stream(topic, written, len(made)))
+            made.append(_stream(topic, written, {stream.type for stream in made}))
             used |= {source.topic for _, source in there}
         except _CannotHold as why:
             faults.append(f"{signals[0].topic}: {why}")
@@ -354,13 +355,17 @@ def _scalar(signal: Signal, value: Floats, scale: float) -> Floats:
     return signal.sign * (value / scale - signal.offset)
 
 
-def _stream(topic: str, written: Sequence[_Written], number: int) -> Stream:
-    """Return the stream of a topic; where a field distinguishes its messages, one message for each of its values in turn."""
+def _stream(topic: str, written: Sequence[_Written], types: Set[str]) -> Stream:
+    """Return the stream of a topic, of a type that is none of `types`.
+
+    Where a field distinguishes its messages, there is one message for each of its values in turn.
+    """
     groups: dict[tuple[tuple[str, float], ...], list[_Written]] = {}
     for one in written:
         groups.setdefault(one.signal.where, []).append(one)
     paths = [path for one in written for path in (*one.values, *(name for name, _ in one.signal.where))]
-    kind = f"vessel_msgs/msg/{_type_name(topic)}{number or ''}"
+    names = (f"vessel_msgs/msg/{_type_name(topic)}{number or ''}" for number in count())
+    kind = next(name for name in names if name not in types)
     sizes, definition = _definition(kind, list(dict.fromkeys(paths)))
     bases, parts = [], []
     for where, group in groups.items():
@@ -396,7 +401,8 @@ def _held(values: Floats, source: Stream, base: Stream) -> Floats:
 
 
 def _type_name(topic: str) -> str:
-    return "".join(part[:1].upper() + part[1:] for part in re.findall(r"[A-Za-z0-9]+", topic)) or "Message"
+    name = "".join(part[:1].upper() + part[1:] for part in re.findall(r"[A-Za-z0-9]+", topic))
+    return name if name[:1].isalpha() else f"Message{name}"
 
 
 def _definition(kind: str, paths: Sequence[str]) -> tuple[dict[str, int], str]:

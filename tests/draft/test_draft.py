@@ -11,7 +11,8 @@ import pytest
 
 from ferryid import api
 from ferryid.draft import Answers, Draft, Question, StatedWindow, draft_profile, draft_text, new_profile, questions
-from ferryid.draft.actuators import UNKNOWN_ORDER
+from ferryid.draft.actuators import UNKNOWN_ORDER, DraftedActuator
+from ferryid.draft.draft import with_kind
 from ferryid.draft.mapped import MappedSignal
 from ferryid.draft.write import as_text
 from ferryid.errors import FerryIdError
@@ -482,6 +483,22 @@ def test_like_a_vessel_of_forces_a_speed_is_a_force_and_an_angle_none(tmp_path: 
     assert "its field is called a speed: that it is the force is as in the profile milliampere" in draft_text(
         draft, Answers("twin")
     )
+
+
+def test_like_a_vessel_of_forces_a_speed_beside_a_thrust_is_no_force() -> None:
+    text = re.sub(r"\[actuator\.thrust\](.|\n)*?(?=\n\[)", "", load_profile("milliampere").text)
+    text = (
+        text.replace('kind = "azimuth"', 'kind = "force"')
+        .replace(".speed", ".force")
+        .replace('unit = "rpm"', 'unit = "N"')
+    )
+    known = parse_profile(re.sub(r'\[signals\."thruster..angle(.|\n)*?(?=\n\[)', "", text), "forces.toml")
+    speed, thrust = (
+        MappedSignal(f"thruster1.{what}", "/state", (what,), unit)
+        for what, unit in (("speed", "rpm"), ("thrust.command", "kN"))
+    )
+    found = with_kind(DraftedActuator("thruster1", "propeller", (speed, thrust)), known)
+    assert [(one.quantity, one.unit) for one in found.signals] == [("thruster1.force.command", "kN")]
 
 
 def mapped(signals: tuple) -> set[tuple]:

@@ -30,7 +30,9 @@ def test_blocks_of_a_ship_hold_windows_to_judge_in() -> None:
     assert max(one.stop - one.start for mask in usual.validation for one in segments(mask)) < 10.0 * 2.0 * length_s
     lengths = [0.1 * (one.stop - one.start) for mask in longer.validation for one in segments(mask)]
     assert min(lengths) >= 2.0 * length_s - 0.1
-    assert longer.notes[-1] == "Blocks are 128 s or longer, as predictions are judged in windows of 64 s."
+    assert (
+        longer.notes[-1] == "Blocks are 128 s or longer, or whole logs, as predictions are judged in windows of 64 s."
+    )
     assert same(judged_split(logs, FERRY, SETTINGS, 1.0), usual), "windows of a ferry fit into the usual blocks"
 
 
@@ -42,6 +44,12 @@ def test_where_longer_blocks_do_not_help_the_usual_ones_stay_and_the_error_is_na
         told = judged_by_force(parts, logs, SHIP)
         assert "held-out data hold 0 windows of 64 s, and 6 are needed" in told
         assert ("--split logs" in told) == (len(logs) > 1)
+
+
+def test_logs_too_short_for_three_longer_blocks_are_said_to_be_whole() -> None:
+    parts = judged_split([motion(np.ones(1000, dtype=bool), log=f"log{k}") for k in range(12)], SHIP, SETTINGS, 1.0)
+    assert parts.notes[0].startswith("log0: 1 block of 100 s;")
+    assert "128 s or longer, or whole logs, as" in parts.notes[-1]
 
 
 def test_the_thesis_and_other_splits_are_left_alone() -> None:

@@ -18,8 +18,12 @@ SECOND = 1_000_000_000
 def read(folder: Path, times: list[str]) -> tuple[Nanoseconds, ClockReport]:
     path = folder / "log.csv"
     path.write_text("\n".join(["t,u", *(f"{one},{k}" for k, one in enumerate(times))]) + "\n", encoding="utf-8")
+    return read_columns(path, "u")
+
+
+def read_columns(path: Path, *columns: str) -> tuple[Nanoseconds, ClockReport]:
     reader = open_log(path)
-    ((found, _, report),) = repair_all(reader.read({topic.name: ("u",) for topic in reader.topics})).values()
+    ((found, _, report),) = repair_all(reader.read({topic.name: columns for topic in reader.topics})).values()
     return found, report
 
 
@@ -66,3 +70,33 @@ def test_times_that_are_not_coarse_are_left_alone() -> None:
     for times in (jittered, some, back, few, jittered[:1], jittered[:0]):
         assert unrounded(times)[1] == ""
         assert unrounded(times)[0] is times
+
+
+def test_rows_that_hold_the_same_as_another_of_their_time_were_written_twice(tmp_path: Path) -> None:
+    true = 0.1 * np.arange(600)
+    path = tmp_path / "log.csv"
+    rows = [f"{one:.1f},{k}\n" * (2 if k % 5 == 0 else 1) for k, one in enumerate(true)]
+    path.write_text("t,u\n" + "".join(rows), encoding="utf-8")
+    found, report = read_columns(path, "u")
+    assert (report.count, report.duplicates) == (600, 120)
+    np.testing.assert_allclose(found / SECOND, true, atol=1e-6)
+    assert not any("rounded" in one for one in report.notes)
+
+
+def test_rows_of_one_time_that_fill_other_columns_are_of_several_sensors(tmp_path: Path) -> None:
+    true = 0.1 * np.arange(600)
+    path = tmp_path / "log.csv"
+    rows = [f"{one:.1f},{k},\n" + (f"{one:.1f},,{k}\n" if k % 5 == 0 else "") for k, one in enumerate(true)]
+    path.write_text("t,u,wind\n" + "".join(rows), encoding="utf-8")
+    found, report = read_columns(path, "u", "wind")
+    np.testing.assert_allclose(found / SECOND, true, atol=1e-6)
+    (said,) = (one for one in report.notes if "repeat" in one)
+    assert "120 of 720 rows repeat the time of another and are left out: they fill other columns" in said
+
+
+def test_values_that_are_held_between_samples_do_not_hinder(tmp_path: Path) -> None:
+    true = np.arange(0.0, 600.0, 0.1353)
+    path = tmp_path / "log.csv"
+    path.write_text("t,u\n" + "".join(f"{one:.0f},{int(one / 1.9)}\n" for one in true), encoding="utf-8")
+    _, report = read_columns(path, "u")
+    assert report.count == len(true)

@@ -153,6 +153,14 @@ def test_a_log_is_read_with_the_profile_it_was_simulated_with(trial: Simulation,
     np.testing.assert_allclose(found, truth, atol=0.2)
 
 
+@pytest.mark.parametrize("topic", ["/motors3", "2021-05-11/fix"])
+def test_topics_of_any_names_have_types_of_their_own(trial: Simulation, tmp_path: Path, topic: str) -> None:
+    boat = parse_profile(BOAT.replace('"/gnss/fix"', f'"{topic}"'), "boat.toml")
+    streams, _ = in_vessel_topics(trial.streams, boat)
+    write_log(replace(trial, profile=boat, streams=streams), tmp_path / "t.mcap")
+    assert set(columns(tmp_path / "t.mcap", boat)) >= {"x", "y", "n_thruster1", "n_thruster2"}
+
+
 def test_topics_that_are_the_simulators_stay_as_they_are(trial: Simulation) -> None:
     for profile in (FERRY, load_profile("revolt")):
         simulated = (
@@ -210,6 +218,19 @@ def test_a_log_of_a_table_whose_columns_no_message_has_comes_with_a_profile(tmp_
     with pytest.raises(FerryIdError, match=r"trial\.vessel\.toml"):
         run_scenario(str(tmp_path / "trial.toml"), tmp_path, progress=lambda _: None)
     assert not (tmp_path / "trial.mcap").exists()
+    run_scenario(str(tmp_path / "trial.toml"), tmp_path, overwrite=True, progress=lambda _: None)
+    # Another file is never replaced, such as the vessel's own profile.
+    (tmp_path / "boat.vessel.toml").write_text(text)
+    (tmp_path / "trial.toml").write_text((tmp_path / "trial.toml").read_text().replace("boat.toml", "boat.vessel.toml"))
+    for overwrite in (False, True):
+        with pytest.raises(
+            FerryIdError, match=r"boat\.vessel\.toml: .* found another file\. Fix: give the log another"
+        ):
+            run_scenario(
+                str(tmp_path / "trial.toml"), tmp_path, log=tmp_path / "boat.mcap", overwrite=overwrite,
+                progress=lambda _: None,
+            )  # fmt: skip
+    assert (tmp_path / "boat.vessel.toml").read_text() == text
     # As columns that are words are no trouble, a table's profile reads the log of a table's vessel.
     plain = parse_profile(text.replace("heading (deg)", "heading"), "boat.toml")
     streams, notes = in_vessel_topics(simulate(replace(load_scenario("four-corner"), duration_s=5.0)).streams, plain)

@@ -90,12 +90,12 @@ def held_rows(values: Floats, usable: NDArray[np.bool_], step_s: float) -> NDArr
     lengths = edges[:, 1] - edges[:, 0] + 1
     usual = float(np.median(np.concatenate([lengths, np.ones(max(len(changes) - len(lengths), 0))])))
     long = lengths > max(CHECKS.held_runs * usual, CHECKS.held_rows, CHECKS.held_s / step_s)
-    jump = _least_jump(values, usable)
+    jump, rounding = _least_jump(values, usable), _Rounding(values, usable)
     for first, last in edges[long].tolist():
         missed = abs(float(values[min(last + 1, len(values) - 1)] - values[last]))
         if (
             values[first] != 0.0
-            and missed > max(jump, _rounding(values, usable, first, last))
+            and missed > max(jump, rounding.jump_after(first, last))
             and missed >= CHECKS.held_missed * _usual(values, usable, first, last)
         ):
             held[first + 1 : last + 1] = True
@@ -133,22 +133,29 @@ def _least_jump(values: Floats, usable: NDArray[np.bool_]) -> float:
     return CHECKS.held_jump * float(np.median(changes)) if coarse or _interpolated(values, usable) else 0.0
 
 
-def _rounding(values: Floats, usable: NDArray[np.bool_], first: int, last: int) -> float:
-    """Return how far a channel has to jump after a hold where its values repeat at times around it too, else zero.
+class _Rounding:
+    """How far a channel has to jump after a hold where its values repeat at times around it too.
 
     Numbers written with so many digits are coarser where they are large: a degree beyond 100, a tenth below. A whole log then
     has no one resolution, and between the rows of a grid a step of it is in two parts.
     """
-    same = np.flatnonzero(usable[1:] & usable[:-1])
-    step = np.abs(np.diff(values))[same]
-    changed = np.flatnonzero(step > 0.0)
-    before, after = changed[same[changed] < first], changed[same[changed] > last]
-    sides = [one for one in (before[-CHECKS.held_around :], after[: CHECKS.held_around]) if one.size]
-    rows = sum(int(one[-1] - one[0]) + 1 for one in sides)
-    changes = sum(one.size for one in sides)
-    if rows - changes < CHECKS.coarse_share * rows or not sides:
-        return 0.0
-    return CHECKS.held_jump * max(float(np.median(step[one])) for one in sides)
+
+    def __init__(self, values: Floats, usable: NDArray[np.bool_]) -> None:
+        same = np.flatnonzero(usable[1:] & usable[:-1])
+        self._step = np.abs(np.diff(values))[same]
+        self._changed = np.flatnonzero(self._step > 0.0)
+        self._at = same[self._changed]
+
+    def jump_after(self, first: int, last: int) -> float:
+        """Return it of a hold from row `first` to row `last`, else zero."""
+        before = self._changed[: np.searchsorted(self._at, first)]
+        after = self._changed[np.searchsorted(self._at, last, side="right") :]
+        sides = [one for one in (before[-CHECKS.held_around :], after[: CHECKS.held_around]) if one.size]
+        rows = sum(int(one[-1] - one[0]) + 1 for one in sides)
+        changes = sum(one.size for one in sides)
+        if rows - changes < CHECKS.coarse_share * rows or not sides:
+            return 0.0
+        return CHECKS.held_jump * max(float(np.median(self._step[one])) for one in sides)
 
 
 def _usual(values: Floats, usable: NDArray[np.bool_], first: int, last: int) -> float:

@@ -33,7 +33,7 @@ class FreeRuns:
     before, after
         Position [m], heading [rad], speed [m/s] and yaw rate [rad/s], shape (h, 4); NaN where the log has no position.
     removed, low, high
-        Fraction of the error that was removed with its 95 % block-bootstrap interval, shape (h, 4).
+        Fraction of the error that was removed with its 95 % block-bootstrap interval, shape (h, 4); `high` is NaN with one block.
     starts
         Number of runs.
     """
@@ -48,8 +48,8 @@ class FreeRuns:
 
     @property
     def worse(self) -> tuple[str, ...]:
-        """Which of `QUANTITIES` err more, by `JUDGING.worse_run` and beyond chance, over the longest horizon with data."""
-        known = np.flatnonzero(np.isfinite(self.removed).any(axis=1))
+        """Which of `QUANTITIES` err more, by `JUDGING.worse_run` and beyond chance, over the longest horizon that tells it."""
+        known = np.flatnonzero(np.isfinite(self.high).any(axis=1))
         if not known.size:
             return ()
         removed, high = self.removed[known[-1]], self.high[known[-1]]
@@ -142,6 +142,8 @@ def _judged(horizons: Floats, errors: Floats, block: Ints) -> FreeRuns:
     low, high = np.full(ratio.shape[1], np.nan), np.full(ratio.shape[1], np.nan)
     if counted_runs.any():
         low[counted_runs], high[counted_runs] = np.nanquantile(1.0 - ratio[:, counted_runs], [0.025, 0.975], axis=0)
+    # Draws of one block are all alike, and tell nothing of chance.
+    high[(by_block(count, block) > 0.0).sum(axis=0) < 2] = np.nan
     removed = 1.0 - after / before
     # Where every run diverges, or the log has no stretch that is long enough, there is none.
     starts = len(block) if counted_runs.any() else 0

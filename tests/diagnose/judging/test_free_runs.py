@@ -43,3 +43,10 @@ def test_errors_that_grow_by_more_than_a_tenth_and_than_chance_are_counted() -> 
     errors[:, :, 1] = np.nan
     assert _judged(HORIZONS, errors, np.arange(6)).worse == ("position", "heading", "speed", "yaw rate")
     assert _judged(HORIZONS, np.full((2, 6, 2, 4), np.nan), np.arange(6)).worse == ()
+
+
+def test_one_block_that_reaches_a_horizon_tells_nothing_of_chance() -> None:
+    errors = np.ones((2, 6, 2, 4))
+    errors[1, :, 0], errors[1, 0, 1] = 0.5, 1.3
+    errors[:, 1:, 1] = np.nan
+    assert _judged(HORIZONS, errors, np.arange(6)).worse == ()
