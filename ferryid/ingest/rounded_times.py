@@ -50,11 +50,11 @@ def unrounded(times: Nanoseconds, columns: Iterable[Column] = ()) -> tuple[Nanos
     # A row that was written twice holds the same, and the next one does not; what is held between samples shows in both.
     if len(distinct) <= 2 * _STEPS or np.mean(same[again]) > max(_MOST, 2.0 * np.mean(same[~again])):
         return times, ""
+    rows = f"{repeats} of {counted(len(times), 'row')} {verb(repeats, 'repeats')}"
     if np.mean(other[again]) > _MOST:
-        what = f"{repeats} of {len(times)} rows repeat the time of another and are left out"
         return (
             times,
-            f"{what}: they fill other columns, as rows of several sensors do. Fix: write those of one time as one row",
+            f"{rows} the time of another and are left out: they fill other columns, as rows of several sensors do. Fix: write those of one time as one row",
         )
     rounding = _rounding(distinct)[np.cumsum(fresh) - 1]
     start, period = _line(times, rounding)
@@ -64,7 +64,6 @@ def unrounded(times: Nanoseconds, columns: Iterable[Column] = ()) -> tuple[Nanos
     if np.median(coarse) < period:
         return times, ""
     size = _sizes(coarse)
-    rows = f"{repeats} of {counted(len(times), 'row')} {verb(repeats, 'repeats')}"
     what = f"{rows} the time of another, as times that are rounded to {size} s do"
     pace = f"evenly {period / _SECOND_NS:.4g} s apart ({_SECOND_NS / period:.3g} Hz)"
     counts = np.diff(np.flatnonzero(np.concatenate([fresh, [True]])))[1:-1]

@@ -33,7 +33,8 @@ class FreeRuns:
     before, after
         Position [m], heading [rad], speed [m/s] and yaw rate [rad/s], shape (h, 4); NaN where the log has no position.
     removed, low, high
-        Fraction of the error that was removed with its 95 % block-bootstrap interval, shape (h, 4); `high` is NaN with one block.
+        Fraction of the error that was removed with its 95 % block-bootstrap interval, shape (h, 4). Of one block `high`
+        is NaN.
     starts
         Number of runs.
     """
