@@ -52,10 +52,8 @@ def unrounded(times: Nanoseconds, columns: Iterable[Column] = ()) -> tuple[Nanos
         return times, ""
     rows = f"{repeats} of {counted(len(times), 'row')} {verb(repeats, 'repeats')}"
     if np.mean(other[again]) > _MOST:
-        return (
-            times,
-            f"{rows} the time of another and are left out: they fill other columns, as rows of several sensors do. Fix: write those of one time as one row",
-        )
+        why = "they fill other columns, as rows of several sensors do. Fix: write those of one time as one row"
+        return times, f"{rows} the time of another and are left out: {why}"
     rounding = _rounding(distinct)[np.cumsum(fresh) - 1]
     start, period = _line(times, rounding)
     even = start + period * np.arange(len(times))
