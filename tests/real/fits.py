@@ -150,7 +150,7 @@ def section(case: Case, result: FitOutcome, folder: Path) -> str:
     for run, who in ((base, "Base model"), (new, "New model")):
         if run.note:
             lines.append(f"{who}: {run.note}.\n")
-    lines += [f"- {warning}" for warning in result.warnings]
+    lines += [f"- {warning.replace(f'{DATA}/', '')}" for warning in result.warnings]
     lines += ["", "What the data-quality check found: ", ""]
     for log in result.logs:
         told = [str(remark) for remark in log.data_quality["remarks"]]
