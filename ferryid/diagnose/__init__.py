@@ -5,9 +5,9 @@ from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.data.measurements import check_withheld
 from ferryid.diagnose.inference.group_differences import GROUPS
 from ferryid.diagnose.judging.diagnosis import SCHEMA, Diagnosis, Withheld, copies_as_json, finding_as_json, to_json
+from ferryid.diagnose.judging.difference import Difference
 from ferryid.diagnose.judging.error_profiles import Profiled
 from ferryid.diagnose.judging.finding import UNKNOWN, Finding
-from ferryid.diagnose.judging.group_differences import Difference
 from ferryid.diagnose.judging.likeness import Likeness, Pair, likeness_as_json, separation
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.judging.verdict import campaign_verdict, error_ratio, worse_axes

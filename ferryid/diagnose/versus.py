@@ -13,15 +13,17 @@ from ferryid.diagnose.inference.campaign import assemble, repeated
 from ferryid.diagnose.inference.group_differences import GROUPS, in_groups
 from ferryid.diagnose.inference.stages import AveragedLog
 from ferryid.diagnose.inference.thresholds import INFERENCE
+from ferryid.diagnose.judging.difference import Difference
 from ferryid.diagnose.judging.group_differences import (
-    Difference,
     JudgedGroups,
+    beside_sensors,
     judge_groups,
     notes_of,
     smallest_note,
     summary,
 )
 from ferryid.diagnose.judging.group_loads import LoadDifference
+from ferryid.diagnose.judging.sensor_differences import sensor_differences
 from ferryid.diagnose.pipeline import DiagnosisSettings
 from ferryid.errors import FerryIdError
 from ferryid.files import resolved
@@ -122,7 +124,8 @@ def compare_groups(
                 f"{counted(INFERENCE.campaign_windows, 'overlapping window')}. Fix: give longer logs"
             )
     campaign = in_groups(assembled[0], [name_of[path] for path in place])
-    judged = judge_groups(campaign, run.progress)
+    sensors = sensor_differences(averaged, [name_of[one.path] for one in averaged])
+    judged = beside_sensors(judge_groups(campaign, run.progress), sensors, hull_known=campaign.hull.known)
     groups = {
         group: tuple(_group_log(one) for one in averaged if one.path in place and name_of[one.path] == group)
         for group in GROUPS
@@ -209,8 +212,8 @@ def versus_json(found: Versus) -> dict[str, Any]:
 def _difference_json(one: Difference) -> dict[str, Any]:
     gains = {} if one.by_group is None else one.by_group
     return {
-        "effect": one.candidate.effect.id,
-        "instance": one.candidate.instance,
+        "effect": one.effect,
+        "instance": one.instance,
         "group": one.group,
         "parameters": {
             name: {**vars(estimate), "smallest": one.smallest[name]} for name, estimate in one.estimates.items()
@@ -224,7 +227,8 @@ def _difference_json(one: Difference) -> dict[str, Any]:
         "rivals": [vars(rival) for rival in one.rivals],
         "unresolved_with": list(one.unresolved_with),
         "separating_manoeuvre": one.separating_manoeuvre,
-        "confirmed": one.gain is not None and not one.doubt,
+        "confirmed": one.selected and not one.doubt,
+        "shown_by": one.shown_by,
         "says": one.says,
     }
 

@@ -5,8 +5,8 @@ An effect takes a force model and returns another, in which its own physics acts
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from math import cos, inf, sin
 
 import numpy as np
@@ -73,6 +73,8 @@ class Measurements:
     repeats
         Where old values were repeated and taken out before: places of the channels among the columns of `eta` and `nu_raw`,
         and times of the last right sample before and of the first one after [s].
+    actuation
+        Aligned signals of the actuators, by column, where their force depends on the velocity; empty where none does.
     """
 
     profile: Profile
@@ -89,6 +91,7 @@ class Measurements:
     rudders: Floats | None = None
     slopes: frozenset[str] = frozenset()
     repeats: tuple[tuple[tuple[int, ...], float, float], ...] = ()
+    actuation: Mapping[str, Floats] = field(default_factory=dict)
 
     @property
     def step_s(self) -> float:

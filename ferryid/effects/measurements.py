@@ -62,6 +62,30 @@ def actuator_forces(
     return np.stack(parts, axis=1), np.column_stack(angles)
 
 
+def actuation_of(profile: Profile, columns: Mapping[str, Floats]) -> dict[str, Floats]:
+    """Return `Measurements.actuation` of the aligned signals of a log."""
+    meets_water = any(
+        one.rudder or (one.thrust is not None and one.thrust.kind == "open_water") for one in profile.actuators
+    )
+    if not meets_water:
+        return {}
+    chosen, _ = actuator_columns(profile, columns)
+    return {column: columns[column] for column in chosen.values()}
+
+
+def at_velocity(measurements: Measurements) -> Measurements:
+    """Return measurements whose actuators push as they do at the velocity that is there now, as after a correction."""
+    if not measurements.actuation:
+        return measurements
+    flow, profile = measurements.current, measurements.profile
+    through_water = (
+        measurements.nu_raw if flow is None else measurements.nu_raw - current_in_body(flow, measurements.psi)
+    )
+    parts, _ = actuator_forces(profile, measurements.actuation, through_water, measurements.usable)
+    rudders = rudder_states(profile, measurements.actuation, through_water, measurements.usable)
+    return replace(measurements, parts=parts, rudders=rudders)
+
+
 def rudder_states(
     profile: Profile, columns: Mapping[str, Floats], through_water: Floats, usable: Flags
 ) -> Floats | None:

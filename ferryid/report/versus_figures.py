@@ -71,7 +71,7 @@ def intervals(found: Versus) -> str:
 
 def _rows(one: Difference, verdict: str) -> list[PropertyRow]:
     rows = []
-    for each in one.candidate.parameters:
+    for each in one.parameters:
         if each.name in one.estimates:
             found = one.estimates[each.name]
             # Of what acts in A relative to B, the other sign is that of B relative to A, to first order.

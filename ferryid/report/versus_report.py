@@ -95,9 +95,13 @@ def unresolved(one: Difference) -> str:
     """Return what a difference cannot be separated from, and the manoeuvre that would; empty where there is none."""
     if not one.unresolved_with:
         return ""
-    names = " and ".join(uncapitalised(title(each)) for each in one.unresolved_with)
-    within = f"within {JUDGING.unresolved_evidence:g} nat"
-    return f"Not separable from {names}, {within}; what separates them: {one.separating_manoeuvre}."
+    near = [each for each in one.instead if each.effect in one.unresolved_with]
+    others = [f"{uncapitalised(each.title)}, {each.group or 'both groups'}: {each.values}" for each in near]
+    others = others or [uncapitalised(title(each)) for each in one.unresolved_with]
+    return (
+        f"These logs cannot tell it from {', or '.join(others)} (evidence within {JUDGING.unresolved_evidence:g} nat); what "
+        f"separates them: {one.separating_manoeuvre}."
+    )
 
 
 def _group_line(found: Versus, group: str) -> str:
@@ -158,7 +162,7 @@ def _held_out(one: Difference) -> str:
 def _row(one: Difference, selected: bool) -> dict[str, Any]:
     return {
         "title": one.title if one.group == GROUPS[1] else f"{one.title}, {one.group} relative to {one.other}",
-        "parameters": [one.said(each) for each in one.candidate.parameters if each.name in one.estimates],
+        "parameters": [one.said(each) for each in one.parameters if each.name in one.estimates],
         "smallest": [one.seen_from(name) for name in one.smallest],
         "evidence": f"{one.evidence:+.0f}" if round(one.evidence) else "0",
         "selected": selected and not one.doubt,

@@ -79,6 +79,8 @@ class Case(Record):
         How many logs there are, which are a campaign where there are several.
     first_log
         Number of the log of a campaign from which on the first of `truths` acts.
+    before
+        How many further logs there are that these are compared with, in which nothing of `truths` acts.
     """
 
     name: str
@@ -100,6 +102,7 @@ class Case(Record):
     distinct_size: float = 0.0
     logs: int = 1
     first_log: int = 0
+    before: int = 0
 
 
 def parameter_vectors(names: Sequence[str]) -> list[tuple[str, ...]]:

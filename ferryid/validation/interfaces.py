@@ -24,6 +24,11 @@ class WrittenLog(Protocol):
         """Further logs, which are a campaign with the first."""
         ...
 
+    @property
+    def before(self) -> tuple[Path, ...]:
+        """Logs that these are compared with: what changed between the groups is asked for then."""
+        ...
+
 
 class Generate(Protocol):
     """Writes the log of a case into a folder; `transfer` makes another of the same truth, with other noise."""

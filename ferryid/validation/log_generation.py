@@ -20,11 +20,12 @@ TRANSFER_SEED = 0x5EED
 
 @dataclass(frozen=True)
 class LogFiles:
-    """The log and the profile of a case, and the further logs of a campaign."""
+    """The log and the profile of a case, the further logs of a campaign, and logs that these are compared with."""
 
     log: Path
     profile: Path
     more: tuple[Path, ...] = ()
+    before: tuple[Path, ...] = ()
 
 
 def generate(case: Case, folder: Path, *, transfer: bool = False) -> LogFiles:

@@ -201,7 +201,7 @@ def _written_logs(stage: Any, folder: RunFolder, cases: Sequence[Case], pipeline
     work = {case.name: case for case in cases}
     written = stage(WRITING, lines, work, partial(write_case, pipeline.generate, logs))
     return {
-        name: LogJob(folder.path, folder.sources, name, files.log, files.profile, files.more)
+        name: LogJob(folder.path, folder.sources, name, files.log, files.profile, files.more, files.before)
         for name, files in _parsed(CaseFiles, lines, written).items()
     }
 

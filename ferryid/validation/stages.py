@@ -31,6 +31,8 @@ class LogJob:
         Of the case, and of the two files in its folder.
     more
         Further logs there, which are a campaign with the first.
+    before
+        Logs there that these are compared with: what changed is asked for then.
     """
 
     run: Path
@@ -39,6 +41,7 @@ class LogJob:
     log: str
     profile: str
     more: tuple[str, ...] = ()
+    before: tuple[str, ...] = ()
 
     @property
     def folder(self) -> Path:
@@ -53,11 +56,12 @@ class LogJob:
 
 @dataclass(frozen=True)
 class CaseFiles(Record):
-    """Names of the log, of its vessel's profile and of further logs of a campaign in the folder of a case."""
+    """Names in the folder of a case: log, vessel's profile, further logs of a campaign, and those it is compared with."""
 
     log: str
     profile: str
     more: tuple[str, ...] = ()
+    before: tuple[str, ...] = ()
 
 
 def write_case(generate: Generate, logs: Path, case: Case) -> dict[str, Any]:
@@ -65,11 +69,11 @@ def write_case(generate: Generate, logs: Path, case: Case) -> dict[str, Any]:
     with replacing(logs / case.name) as temporary:
         temporary.mkdir(parents=True)
         made = generate(case, temporary)
-        more = tuple(path.name for path in made.more)
-        other = {path.name for path in temporary.iterdir()} - {made.log.name, made.profile.name, *more}
+        more, before = (tuple(path.name for path in paths) for paths in (made.more, made.before))
+        other = {path.name for path in temporary.iterdir()} - {made.log.name, made.profile.name, *more, *before}
         if other:  # it may be an answer
             raise ValueError(f"beside a log there may be its profile only, found {', '.join(sorted(other))}")
-    return CaseFiles(made.log.name, made.profile.name, more).to_json()
+    return CaseFiles(made.log.name, made.profile.name, more, before).to_json()
 
 
 def diagnose_case(job: LogJob) -> dict[str, Any]:
@@ -89,8 +93,8 @@ def diagnose_case(job: LogJob) -> dict[str, Any]:
     # A model of an earlier try, which was killed before its line was written, must not make this one the second.
     shutil.rmtree(job.out, ignore_errors=True)
     worker = worker_of(job.run)
-    more = tuple(job.folder / name for name in job.more)
-    diagnosis = worker.diagnose(path, job.folder / job.profile, job.out, more)
+    more, before = (tuple(job.folder / name for name in names) for names in (job.more, job.before))
+    diagnosis = worker.diagnose(path, job.folder / job.profile, job.out, more, before)
     if worker.sources != job.sources:
         raise FerryIdError(
             f"prove: a worker has other sources of ferryid ({worker.sources}) than those of the commitment "

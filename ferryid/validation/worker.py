@@ -30,7 +30,9 @@ RIVALS = 2
 KEPT = ("effect", "instance", "probability", "parameters", "improvement", "unresolved_with", "says")
 
 
-def diagnose_log(log: Path, profile: Path, out: Path, more: Sequence[Path] = ()) -> Diagnosis:
+def diagnose_log(
+    log: Path, profile: Path, out: Path, more: Sequence[Path] = (), before: Sequence[Path] = ()
+) -> Diagnosis:
     """Return the diagnosis of one log, or of a campaign; ``refused`` for what cannot be used.
 
     Parameters
@@ -41,13 +43,15 @@ def diagnose_log(log: Path, profile: Path, out: Path, more: Sequence[Path] = ())
         Folder for the model that comes of it.
     more
         Further logs, which are a campaign with the first: what most of its logs show is a finding.
+    before
+        Logs that these are compared with: findings are then what changed between the two groups.
 
     Raises
     ------
     UnwritableError
         Where the model could not be written.
     """
-    from ferryid.diagnose import DiagnosisSettings, diagnose_and_store, to_json
+    from ferryid.diagnose import DiagnosisSettings, compare_groups, diagnose_and_store, to_json, versus_json
     from ferryid.types import RunContext
     from ferryid.vessel import load_profile
 
@@ -55,7 +59,11 @@ def diagnose_log(log: Path, profile: Path, out: Path, more: Sequence[Path] = ())
     try:
         vessel = load_profile(profile)
         run = RunContext(out, keep_tables=False)
-        found = diagnose_and_store([str(log), *map(str, more)], vessel, DiagnosisSettings(), run)
+        logs = [str(log), *map(str, more)]
+        if before:
+            differences = versus_json(compare_groups([*map(str, before)], logs, vessel, DiagnosisSettings(), run))
+            return _changes(differences, time.perf_counter() - start)
+        found = diagnose_and_store(logs, vessel, DiagnosisSettings(), run)
         seconds = time.perf_counter() - start
         every = [to_json(one) for one in found]
         made = every[0] if len(every) == 1 else _campaign(every)
@@ -70,6 +78,29 @@ def diagnose_log(log: Path, profile: Path, out: Path, more: Sequence[Path] = ())
             "findings": [_finding(one) for one in made["findings"]],
             "model": None if made["model"] is None else os.path.relpath(made["model"], out),
         }
+    )
+
+
+def _changes(made: Mapping[str, Any], seconds: float) -> Diagnosis:
+    """Return what two groups of logs differ in as a diagnosis of the second; what acts in the first has another name."""
+    from ferryid.diagnose import GROUPS
+
+    findings = []
+    for one in made["differences"]:
+        instance = (
+            one["instance"] if one["group"] == GROUPS[1] else f"{one['instance'] or 'vessel'}, in group {GROUPS[0]}"
+        )
+        parameters = {
+            name: {key: value for key, value in each.items() if key != "smallest"}
+            for name, each in one["parameters"].items()
+        }
+        findings.append(
+            {name: one[name] for name in ("effect", "probability", "unresolved_with", "says")}
+            | {"instance": instance, "parameters": parameters, "improvement": {}, "rivals": one["rivals"][:RIVALS]}
+            | {"onset": None, "offset": None, "log": 0}
+        )
+    return Diagnosis.from_json(
+        {"verdict": made["verdict"], "seconds": seconds, "findings": findings, "notes": made["notes"]}
     )
 
 
@@ -125,8 +156,9 @@ def main(diagnose: Callable[..., Diagnosis] = diagnose_log) -> None:
         log, profile, out = (Path(request[name]) for name in ("log", "profile", "out"))
         start = time.perf_counter()
         try:
-            more = [Path(path) for path in request["more"]]
-            answer = (diagnose(log, profile, out, more) if more else diagnose(log, profile, out)).to_json()
+            more, before = ([Path(path) for path in request[name]] for name in ("more", "before"))
+            others = (more, before) if before else (more,) if more else ()
+            answer = diagnose(log, profile, out, *others).to_json()
         except UnwritableError as error:
             answer = {UNWRITABLE: str(error)}
         except Exception as error:  # noqa: BLE001 - a bug that one log shows is reported in its line, and the others go on

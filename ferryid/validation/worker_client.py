@@ -55,8 +55,12 @@ class WorkerClient:
     ) -> None:
         self.close()
 
-    def diagnose(self, log: Path, profile: Path, out: Path, more: Sequence[Path] = ()) -> Diagnosis:
+    def diagnose(
+        self, log: Path, profile: Path, out: Path, more: Sequence[Path] = (), before: Sequence[Path] = ()
+    ) -> Diagnosis:
         """Return the diagnosis of a log, or with more of them of a campaign; ``crashed`` where the process died every time.
+
+        With logs before it, what changed since.
 
         Raises
         ------
@@ -69,6 +73,7 @@ class WorkerClient:
             "profile": str(resolved(profile)),
             "out": str(resolved(out)),
             "more": [str(resolved(path)) for path in more],
+            "before": [str(resolved(path)) for path in before],
         }
         start = time.perf_counter()
         for _ in range(TRIES):

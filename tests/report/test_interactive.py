@@ -339,7 +339,7 @@ def test_a_drawing_has_the_ground_of_a_dark_page(page: Page, written: Path) -> N
 
 def test_the_differences_of_two_groups_fold_on_a_telephone(page: Page, tmp_path: Path) -> None:
     gain = replace(Candidate.of(effects()["thruster_gain"], "thruster1", load_profile("milliampere")), group="B")
-    one = Difference(gain, {"factor": Estimate(0.9, 0.8, 1.0, "-")}, -0.2, 0.1, {"factor": None})
+    one = Difference.of(gain, {"factor": Estimate(0.9, 0.8, 1.0, "-")}, -0.2, 0.1, {"factor": None})
     found = Versus("ferry", {}, JudgedGroups((), (one,), (), (), 1.0), (), "", "")
     path = tmp_path / "versus.html"
     path.write_text(versus_page(found)[0], encoding="utf-8")

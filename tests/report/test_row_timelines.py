@@ -111,10 +111,10 @@ def test_properties_are_drawn_in_usual_sizes_within_a_frame() -> None:
     gain = Candidate.of(effects()["thruster_gain"], "thruster1", PROFILES["milliampere"])
     (factor,) = gain.parameters
     low, value, high = (factor.neutral + k * factor.size for k in (-2.0, -1.0, 0.5))
-    differs = Difference(replace(gain, group="B"), {"factor": Estimate(value, low, high, "-")}, 9.0, 0.1, {})
+    differs = Difference.of(replace(gain, group="B"), {"factor": Estimate(value, low, high, "-")}, 9.0, 0.1, {})
     vague = Estimate(factor.neutral, factor.neutral - 50.0 * factor.size, factor.neutral + 1.0 * factor.size, "-")
     # Of what acts in A, the other sign is that of B relative to A.
-    other = Difference(replace(gain, group="A"), {"factor": vague}, -1.0, 0.1, {})
+    other = Difference.of(replace(gain, group="A"), {"factor": vague}, -1.0, 0.1, {})
     made = versus_timeline(versus(differs, compared=(other,)))
     assert made is not None
     (strip,) = made.strips

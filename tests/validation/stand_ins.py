@@ -45,6 +45,7 @@ class Made:
     log: Path
     profile: Path
     more: tuple[Path, ...] = ()
+    before: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -47,7 +47,9 @@ class Surveyor:
         self.eta = read_log(str(original), load_profile("kvlcc2-model")).measurements.eta
         self.seen: list[str] = []
 
-    def diagnose(self, log: Path, profile: Path, out: Path, more: Sequence[Path] = ()) -> Diagnosis:
+    def diagnose(
+        self, log: Path, profile: Path, out: Path, more: Sequence[Path] = (), before: Sequence[Path] = ()
+    ) -> Diagnosis:
         self.seen.append(log.name)
         assert sorted(path.name for path in log.parent.iterdir()) == sorted([log.name, "vessel.toml"])
         eta = read_log(str(log), load_profile(profile)).measurements.eta

@@ -51,7 +51,9 @@ class Here:
 
     sources = source_hash()
 
-    def diagnose(self, log: Path, profile: Path, out: Path, more: Sequence[Path] = ()) -> Diagnosis:
+    def diagnose(
+        self, log: Path, profile: Path, out: Path, more: Sequence[Path] = (), before: Sequence[Path] = ()
+    ) -> Diagnosis:
         assert log.exists()
         assert profile.exists()
         return Diagnosis("not_testable", 0.0)

@@ -21,12 +21,15 @@ from ferryid.diagnose.checks.contradiction import opposed
 from ferryid.diagnose.checks.pooling import Examined, find_in_turn, pool_check
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
+from ferryid.effects.measurements import at_velocity
 from ferryid.errors import FerryIdError
 from ferryid.signals.complementary_filter import CUBIC_S, complementary_filter
 from ferryid.signals.mirror import mirrored
 from ferryid.signals.smooth import odd_rows, steady_cubic
 
-SPOILS = frozenset({"held_samples", "heading_wrap", "clock_offset", "heading_bias", "velocity_scale", "yaw_rate_scale"})
+SPOILS = frozenset(
+    {"held_samples", "heading_wrap", "clock_offset", "heading_bias", "velocity_scale", "yaw_rate_scale", "lever_arm"}
+)
 """Errors that spoil the velocity in products, which is made of position, heading and velocity.
 
 Its slow part is that of the positions, so that a late clock is in one part of it and not in the other.
@@ -103,9 +106,13 @@ def examine_together(
 
 
 def _refiltered(findings: Sequence[SensorFinding], measured: Measurements, corrected: Measurements) -> Measurements:
-    """Return what was corrected with a velocity in products made of it, where that is spoilt."""
-    spoilt = corrected is not measured and SPOILS & {finding.effect for finding in findings}
-    return refilter_velocity(corrected) if spoilt else corrected
+    """Return what was corrected with a velocity in products and forces made of it, where these are spoilt."""
+    errors = {finding.effect for finding in findings}
+    if corrected is measured or not SPOILS & errors:
+        return corrected
+    filtered = refilter_velocity(corrected)
+    # Angles on a grid were moved between its steps: forces of the recorded ones would undo that.
+    return filtered if "azimuth_resolution" in errors else at_velocity(filtered)
 
 
 def sensor_errors(measurements: Measurements) -> dict[str, Mapping[str, Estimate]]:

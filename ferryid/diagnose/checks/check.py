@@ -96,6 +96,8 @@ class Check:
     in_profile
         ``in_profile(profile, values)`` returns the line of the profile that corrects an error of these values in every log, and
         under which heading; empty where the signal map cannot.
+    hidden
+        ``hidden(profile)`` is True where what the profile maps never shows the error, so that an estimate of none says nothing.
     """
 
     id: str
@@ -105,6 +107,7 @@ class Check:
     estimate: Callable[[Measurements], Mapping[str, Estimate]] | None = None
     lasting: Lasting | None = None
     in_profile: Callable[[Profile, Mapping[str, float]], str] = lambda profile, values: ""
+    hidden: Callable[[Profile], bool] = lambda profile: False
 
 
 def mapped(profile: Profile, quantity: str) -> Signal | None:

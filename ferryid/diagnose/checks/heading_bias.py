@@ -17,6 +17,7 @@ from ferryid.diagnose.checks.kinematics import ANGLE, SIZE, Kinematics, kinemati
 from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
+from ferryid.vessel.parse_signals import WORLD_FRAMES
 from ferryid.vessel.profile import Profile
 from ferryid.vessel.units import factor
 
@@ -66,6 +67,12 @@ def in_profile(profile: Profile, values: Mapping[str, float]) -> str:
     return f"{key} = {signal.offset + radians(turned) / factor(unit, 'angle'):.4g} in [signals.heading]"
 
 
+def hidden(profile: Profile) -> bool:
+    """Return whether the velocity is recorded along north and east: the heading resolved it, and its error leaves no trace."""
+    velocity = mapped(profile, "velocity")
+    return velocity is not None and velocity.frame in WORLD_FRAMES
+
+
 def _angle(found: Kinematics) -> Estimate:
     return found.solution.estimate(ANGLE, "deg", degrees(1.0))
 
@@ -78,4 +85,5 @@ CHECK = Check(
     estimate,
     Lasting(0.0, degrees(SIZE[ANGLE]), lambda _: CHECKS.least_angle_deg, says_of, corrected),
     in_profile,
+    hidden,
 )

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import exp, isfinite, log
+from math import exp, log
 
 import numpy as np
 from scipy.special import stdtrit
@@ -113,7 +113,7 @@ def pool(estimates: Sequence[Mapping[str, Estimate]], lasting: Lasting, least: f
     least
         How far a parameter has to be off to be worth a name.
     """
-    known = {i: one for i, one in enumerate(estimates) if one and all(_error(each) > 0.0 for each in one.values())}
+    known = {i: one for i, one in enumerate(estimates) if one and all(each.error > 0.0 for each in one.values())}
     names = next((tuple(one) for one in known.values()), ())
 
     inside = _agreeing(known, names)
@@ -138,7 +138,7 @@ def pool(estimates: Sequence[Mapping[str, Estimate]], lasting: Lasting, least: f
 
 def _common(known: Mapping[int, Mapping[str, Estimate]], name: str, logs: Sequence[int]) -> Common:
     every = [known[i][name] for i in logs]
-    return Common.of(np.array([one.value for one in every]), np.array([_error(one) for one in every]))
+    return Common.of(np.array([one.value for one in every]), np.array([one.error for one in every]))
 
 
 def _agreeing(known: Mapping[int, Mapping[str, Estimate]], names: Sequence[str]) -> list[int]:
@@ -152,7 +152,7 @@ def _agreeing(known: Mapping[int, Mapping[str, Estimate]], names: Sequence[str])
         return [
             i
             for i, one in known.items()
-            if all(common[name].differs(one[name].value, _error(one[name])) <= 1.0 for name in names)
+            if all(common[name].differs(one[name].value, one[name].error) <= 1.0 for name in names)
         ]
 
     inside = max((near([i]) for i in known), key=len, default=[])
@@ -164,15 +164,9 @@ def _agreeing(known: Mapping[int, Mapping[str, Estimate]], names: Sequence[str])
     return inside
 
 
-def _error(one: Estimate) -> float:
-    """Return the standard error of a normal distribution with the interval of an estimate; 0 where it has none."""
-    half = 0.5 * (one.high - one.low)
-    return half / 1.96 if isfinite(half) and isfinite(one.value) else 0.0
-
-
 def _evidence(common: Common, every: Sequence[Estimate], lasting: Lasting) -> float:
     """Return the evidence of all logs for a parameter that is not neutral, under a normal prior [nat]."""
-    spreads = [_error(one) ** 2 + common.scatter**2 for one in every]
+    spreads = [one.error**2 + common.scatter**2 for one in every]
     likelihood = sum(
         0.5 * ((one.value - lasting.neutral) ** 2 - (one.value - common.value) ** 2) / spread
         for one, spread in zip(every, spreads, strict=True)

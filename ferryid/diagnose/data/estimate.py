@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 
 
 @dataclass(frozen=True)
@@ -18,3 +19,9 @@ class Estimate:
     def normal(cls, value: float, error: float, unit: str) -> Estimate:
         """Return an estimate whose error is normal, with this standard deviation."""
         return cls(value, value - 1.96 * error, value + 1.96 * error, unit)
+
+    @property
+    def error(self) -> float:
+        """Standard error of a normal distribution with this interval; 0 where it has none."""
+        half = 0.5 * (self.high - self.low)
+        return half / 1.96 if isfinite(half) and isfinite(self.value) else 0.0

@@ -10,7 +10,7 @@ import numpy as np
 
 from ferryid.diagnose.data.thresholds import DATA
 from ferryid.effects.force_model import Measurements
-from ferryid.effects.measurements import actuator_forces, interpolate_gaps, rudder_states
+from ferryid.effects.measurements import actuation_of, actuator_forces, interpolate_gaps, rudder_states
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.models import validity_ranges
 from ferryid.regression import averaged_out
@@ -305,4 +305,5 @@ def _measurements(track: Track, measured: Measured, profile: Profile, window_s: 
         payload=None if measured.payload is None else interpolate_gaps(measured.payload, usable, held=True),
         rudders=rudder_states(profile, track.columns, through_water, usable),
         slopes=track.slopes,
+        actuation=actuation_of(profile, track.columns),
     )

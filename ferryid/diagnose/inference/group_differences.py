@@ -20,10 +20,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from math import exp
+from math import exp, log, pi, sqrt
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
+from scipy.special import logsumexp
 
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit, estimate_campaign
 from ferryid.diagnose.inference.campaign_model import DIFFERENCE_STEP, Campaign
@@ -42,7 +43,7 @@ from ferryid.effects.effect import Effect, Parameter
 from ferryid.effects.force_model import ForceModel
 from ferryid.effects.wording import ALL_THRUSTERS
 from ferryid.side_by_side import over
-from ferryid.types import Flags, Floats
+from ferryid.types import Flags, Floats, Ints
 
 GROUPS = ("A", "B")
 """The logs that are named first, and those that they are compared with."""
@@ -50,7 +51,7 @@ OF_HULL = frozenset({"fouling"})
 """What a single log shows beside a hull model alone, and groups beside the hull that they share."""
 FAULTS = frozenset({"thruster_gain"})
 """Factors of force. One of the groups has less than the other: a loss in the one, as no actuator gains force of itself."""
-SCATTERS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6)
+SCATTERS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4)
 """Standard deviations between logs that are averaged over beside none, in sizes of a parameter."""
 
 
@@ -82,13 +83,24 @@ class Comparison:
     scatter: float
     smallest: Floats
 
+    @property
+    def excludes_none(self) -> bool:
+        """True where the 95 % interval of some parameter does not hold its neutral value."""
+        neutral = np.array([one.neutral for one in self.candidate.parameters])
+        return bool(np.any(np.abs(self.values - neutral) > 1.96 * self.errors))
+
 
 @dataclass(frozen=True)
 class Contender:
-    """What was tried in place of a difference that was selected, and its evidence less that of the selected one [nat]."""
+    """What was tried in place of a difference that was selected.
+
+    `behind` is its evidence less that of the selected one [nat]; `comparison` what it would be itself, None where the evidence
+    favours it over none as little as that.
+    """
 
     candidate: Candidate
     behind: float
+    comparison: Comparison | None = None
 
 
 def in_groups(campaign: Campaign, names: Sequence[str]) -> Campaign:
@@ -111,18 +123,21 @@ def differences_of(campaign: Campaign) -> list[Candidate]:
     """
     shared = {one.key for one in campaign.properties if not one.group}
     profile = campaign.members[0].windows.measurements.profile
-    found = []
+    found = list[Candidate]()
     for one in effects().values():
         lasts = one.vessel or one.id in INSTRUMENTS or one.id in LOADS
         if not lasts or one.choose is not None or one.unsteady is not None or _untestable(one, campaign):
             continue
         for instance in one.instances(profile):
-            candidate = _as_loss(Candidate.of(one, instance, profile))
+            candidate = Candidate.of(one, instance, profile)
             if one.of_thrust_curve and candidate.key not in shared:
                 continue
             if candidate.parameters and _shown_in_each_group(candidate, campaign):
-                found += [replace(candidate, group=group) for group in _groups(candidate)]
-    return [*found, *_all_thrusters(campaign)]
+                found.append(candidate)
+    found += all_thrusters(campaign)
+    # Beside a level that both groups have, which is less than the other is not known beforehand.
+    sided = [one if one.key in shared else _as_loss(one) for one in found]
+    return [replace(one, group=group) for one in sided for group in _groups(one)]
 
 
 def _as_loss(candidate: Candidate) -> Candidate:
@@ -156,13 +171,13 @@ def _shown_in_each_group(candidate: Candidate, campaign: Campaign) -> bool:
     return shown == {one.group for one in campaign.members}
 
 
-def _all_thrusters(campaign: Campaign) -> list[Candidate]:
+def all_thrusters(campaign: Campaign) -> list[Candidate]:
+    """Return the force of all thrusters alike, where there are several."""
     profile = campaign.members[0].windows.measurements.profile
     if len(profile.actuators) < 2:
         return []
     gain = replace(effects()["thruster_gain"], apply=_scaled)
-    candidate = _as_loss(Candidate.of(gain, ALL_THRUSTERS, profile))
-    return [replace(candidate, group=group) for group in _groups(candidate)]
+    return [Candidate.of(gain, ALL_THRUSTERS, profile)]
 
 
 def _scaled(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
@@ -181,7 +196,9 @@ def select_differences(
     contenders: dict[Candidate, tuple[Contender, ...]] = {}
     while len(made.campaign.properties) < INFERENCE.most_effects:
         taken = made.campaign.properties
-        left = [one for one in (*differences_of(made.campaign), *properties_of(made.campaign)) if one not in taken]
+        # A level of all thrusters that both groups have would be taken for a loss in the one, and then in the other.
+        common = (*properties_of(made.campaign), *all_thrusters(made.campaign))
+        left = [one for one in (*differences_of(made.campaign), *common) if one not in taken]
         # What is compared has the same noise and has settled under it.
         made = estimate_campaign(made.campaign, noise=made.noise, begin=made)
         progress(f"weighing {len(left)} differences between the groups")
@@ -197,8 +214,42 @@ def select_differences(
             without = without_property(made, earlier)
             if compare_estimated(made, earlier, without).evidence < INFERENCE.prior_odds:
                 made = without
-    found = [one for one in made.campaign.properties if one.group]
-    return made, tuple((one, contenders.get(one, ())) for one in found)
+    return _in_place_of_each_other(made, contenders)
+
+
+def _in_place_of_each_other(
+    made: CampaignFit, contenders: dict[Candidate, tuple[Contender, ...]]
+) -> tuple[CampaignFit, tuple[tuple[Candidate, tuple[Contender, ...]], ...]]:
+    """Return an estimate with the likelier of each difference and what contended with it, now that all else is estimated.
+
+    What was selected first was weighed beside less, and what came later may have been what set it apart.
+    """
+    found = []
+    for one in [each for each in made.campaign.properties if each.group]:
+        without = without_property(made, one)
+        taken = made.campaign.properties
+        # The evidence of the one that stands there, under the same noise.
+        settled = estimate_campaign(made.campaign, noise=made.noise, begin=made)
+        best, tried = one, {one: (settled, compare_estimated(settled, one, without))}
+        for other in contenders.get(one, ()):
+            if other.candidate.group and other.candidate not in taken:
+                fit = _estimated(without, other.candidate)
+                tried[other.candidate] = fit, compare_estimated(fit, other.candidate, without)
+        likely = [each for each, (_, here) in tried.items() if here.evidence >= INFERENCE.prior_odds]
+        # An interval that holds none is no name where another's does not.
+        likely = [each for each in likely if tried[each][1].excludes_none] or likely
+        if likely:
+            best = max(likely, key=lambda each: tried[each][1].over_alike)
+        behind = tried[best][1].over_alike
+        rest = [
+            Contender(each, min(here.over_alike - behind, 0.0), here)
+            for each, (_, here) in tried.items()
+            if each is not best
+        ]
+        if best is not one:
+            made = estimate_campaign(tried[best][0].campaign, begin=tried[best][0])
+        found.append((best, tuple(rest)))
+    return made, tuple(found)
 
 
 @dataclass(frozen=True)
@@ -251,8 +302,9 @@ def compare_near(made: CampaignFit, candidate: Candidate) -> Comparison:
     p = len(candidate.parameters)
     with_it, without = _averaged(made, grams, p, True), _averaged(made, grams, p, False)
     neutral = np.array([one.neutral for one in candidate.parameters])
-    evidence = with_it.evidence - without.evidence - candidate.log_alternatives
-    over_alike = with_it.steady - without.steady - candidate.log_alternatives
+    tail = gross(_in_sizes(candidate, neutral) + with_it.shift) - candidate.log_alternatives
+    evidence = with_it.evidence - without.evidence + tail
+    over_alike = with_it.steady - without.steady + tail
     return _comparison(made, candidate, neutral, with_it, evidence, over_alike)
 
 
@@ -289,15 +341,29 @@ def compare_estimated(made: CampaignFit, candidate: Candidate, without: Campaign
             break
         first += len(one.parameters)
     rows = slice(first, first + len(candidate.parameters))
-    slopes = _slopes(without, candidate, made.common[rows])
+    z = made.common[rows]
+    slopes = _slopes(without, candidate, z)
     p = len(candidate.parameters)
-    with_it = _averaged(made, [_gram(made, i, one) for i, one in enumerate(slopes)], p, False, rows)
-    beside = _averaged(without, [_gram(without, i, one) for i, one in enumerate(slopes)], p, False)
+    grams = [_gram(made, i, one) for i, one in enumerate(slopes)]
+    with_it = _averaged(made, grams, p, False, rows)
     value = campaign.values(made.common, made.own[0])[1][campaign.properties.index(candidate)]
-    # How much the scatter adds is linear, what the estimates leave is not.
-    over_alike = made.evidence - without.evidence
-    evidence = over_alike + (with_it.evidence - with_it.steady) - (beside.evidence - beside.steady)
+    tail = gross(_in_sizes(candidate, value))
+    alike = made.evidence - without.evidence
+    # Logs that scatter are where the difference puts them: far from where all are alike, nothing is linear from there.
+    others = [with_it.steady - alike, *_instead(made, grams, p, rows)[1:]]
+    none = float(logsumexp(np.array(others) + np.log(list(_scatters(campaign).values()))))
+    evidence, over_alike = with_it.evidence - none + tail, alike + tail
     return _comparison(made, candidate, value, with_it, evidence, over_alike)
+
+
+def gross(z: Floats) -> float:
+    """Return what a prior of Student's form, of three degrees of freedom, adds to the evidence of a normal one [nat].
+
+    Differences may be gross, such as a propeller that lost a blade: an estimate of many sizes is not less likely for that than
+    logs that scatter as much. `z` is the estimate in sizes, where it is certain.
+    """
+    student = log(2.0 / (pi * sqrt(3.0))) - 2.0 * np.log1p(z**2 / 3.0)
+    return float(np.sum(student + 0.5 * z**2 + 0.5 * log(2.0 * pi)))
 
 
 def _comparison(
@@ -412,35 +478,70 @@ def _averaged(made: CampaignFit, grams: Sequence[_Gram], p: int, beside: bool, r
     g = made.campaign.g
     wide = len(grams[0].slope) - p
     used = np.arange(wide if beside else g)
-    scattered = np.arange(wide, wide + p)
     kept = rows if rows is not None else slice(g, g + p) if beside else slice(0, 0)
-    priors = {0.0: 1.0}
-    if scatter_shows(made.campaign):
-        # A scatter is as rare as any other effect.
-        rare = exp(-INFERENCE.prior_odds)
-        priors = {0.0: 1.0 - rare, **dict.fromkeys(SCATTERS, rare / len(SCATTERS))}
-    logs, shifts, variances = [], [], []
+    priors = _scatters(made.campaign)
     centre, prior = np.zeros(len(used)), np.ones(len(used))
     centre[:g], prior[:g] = made.normal.prior * made.common, made.normal.prior
-    for scatter in priors:
-        A, r, logarithm = np.diag(prior), centre.copy(), 0.0
-        for one in grams:
-            H, h = one.matrix[np.ix_(used, used)], one.slope[used]
-            if scatter > 0.0:
-                B = one.matrix[np.ix_(scattered, scattered)] + np.eye(p) / scatter**2
-                across, mine = one.matrix[np.ix_(used, scattered)], one.slope[scattered]
-                follow = np.linalg.solve(B, np.column_stack([across.T, mine]))
-                H, h = H - across @ follow[:, :-1], h - across @ follow[:, -1]
-                logarithm += 0.5 * float(mine @ follow[:, -1]) - 0.5 * float(np.linalg.slogdet(B * scatter**2)[1])
-            A, r = A + H, r + h
-        move = np.linalg.solve(A, r)
-        logs.append(logarithm + 0.5 * float(r @ move) - 0.5 * float(np.linalg.slogdet(A)[1]))
-        shifts.append(-move[kept])
-        variances.append(np.diag(np.linalg.inv(A))[kept])
-    weights = np.log(list(priors.values())) + np.array(logs)
-    top = float(weights.max())
-    share = np.exp(weights - top)
-    evidence, share = top + float(np.log(share.sum())), share / share.sum()
-    shift = share @ np.array(shifts)
-    variance = share @ (np.array(variances) + (np.array(shifts) - shift) ** 2)
-    return _Averaged(evidence, logs[0], shift, variance, float(share @ np.array(list(priors))))
+    found = [_with_scatter(grams, used, p, one, centre, prior) for one in priors]
+    logs = np.array([one.evidence for one in found])
+    weights = np.log(list(priors.values())) + logs
+    evidence = float(logsumexp(weights))
+    share = np.exp(weights - evidence)
+    shifts = np.array([one.shift[kept] for one in found])
+    shift = share @ shifts
+    variance = share @ (np.array([one.variance[kept] for one in found]) + (shifts - shift) ** 2)
+    return _Averaged(evidence, float(logs[0]), shift, variance, float(share @ np.array(list(priors))))
+
+
+def _scatters(campaign: Campaign) -> dict[float, float]:
+    """Return the standard deviations between logs, in sizes, with their prior probabilities; none is the first."""
+    if not scatter_shows(campaign):
+        return {0.0: 1.0}
+    # A scatter is as rare as any other effect.
+    rare = exp(-INFERENCE.prior_odds)
+    return {0.0: 1.0 - rare, **dict.fromkeys(SCATTERS, rare / len(SCATTERS))}
+
+
+@dataclass(frozen=True)
+class _Step:
+    """The evidence of one scatter, but for what all have in common, and shift and variance of the vector, shape (k,)."""
+
+    evidence: float
+    shift: Floats
+    variance: Floats
+
+
+def _with_scatter(grams: Sequence[_Gram], used: Ints, p: int, scatter: float, centre: Floats, prior: Floats) -> _Step:
+    """Return what one standard deviation between logs [sizes] makes of the `used` part of the vector, with its prior."""
+    wide = len(grams[0].slope) - p
+    scattered = np.arange(wide, wide + p)
+    A, r, logarithm = np.diag(prior), centre.copy(), 0.0
+    for one in grams:
+        H, h = one.matrix[np.ix_(used, used)], one.slope[used]
+        if scatter > 0.0:
+            B = one.matrix[np.ix_(scattered, scattered)] + np.eye(p) / scatter**2
+            across, mine = one.matrix[np.ix_(used, scattered)], one.slope[scattered]
+            follow = np.linalg.solve(B, np.column_stack([across.T, mine]))
+            H, h = H - across @ follow[:, :-1], h - across @ follow[:, -1]
+            logarithm += 0.5 * float(mine @ follow[:, -1]) - 0.5 * float(np.linalg.slogdet(B * scatter**2)[1])
+        A, r = A + H, r + h
+    move = np.linalg.solve(A, r)
+    evidence = logarithm + 0.5 * float(r @ move) - 0.5 * float(np.linalg.slogdet(A)[1])
+    return _Step(evidence, np.asarray(-move), np.diag(np.linalg.inv(A)))
+
+
+def _instead(made: CampaignFit, grams: Sequence[_Gram], p: int, rows: slice) -> list[float]:
+    """Return the evidence of each scatter between logs in place of a difference that stands in an estimate's vector.
+
+    The difference goes back to none, and every log's own part begins there; all is linear about the estimate.
+    """
+    back = np.zeros(len(grams[0].slope))
+    back[rows] = -made.common[rows]
+    moved = [_Gram(one.matrix, one.slope + one.matrix @ back) for one in grams]
+    cost = sum(float(one.slope @ back + 0.5 * back @ one.matrix @ back) for one in grams)
+    used = np.delete(np.arange(made.campaign.g), np.r_[rows])
+    prior = made.normal.prior[used]
+    # The prior of the difference is no longer paid for.
+    cost -= 0.5 * float(made.common[rows] @ made.common[rows])
+    centre = prior * made.common[used]
+    return [_with_scatter(moved, used, p, one, centre, prior).evidence - cost for one in _scatters(made.campaign)]

@@ -16,8 +16,9 @@ from ferryid.diagnose.inference.candidate import Candidate
 from ferryid.diagnose.inference.changes_between_logs import Change, find_change
 from ferryid.diagnose.judging.campaign_errors import LogErrors
 from ferryid.diagnose.judging.campaign_evidence import HeldOutLoss, held_out_loss
+from ferryid.diagnose.judging.difference import Difference
 from ferryid.diagnose.judging.finding import Finding
-from ferryid.diagnose.judging.group_differences import Difference, judged_difference
+from ferryid.diagnose.judging.group_differences import judged_difference
 from ferryid.effects.payload import whereabouts
 from ferryid.effects.wording import ALL_THRUSTERS
 from ferryid.types import AXES

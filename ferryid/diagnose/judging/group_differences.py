@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from math import exp, isfinite
+from math import isfinite
 
 import numpy as np
 
@@ -30,110 +30,16 @@ from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.campaign_conditions import judge_conditions
 from ferryid.diagnose.judging.campaign_evidence import Gain, held_out_loss
 from ferryid.diagnose.judging.credibility import value_doubt
-from ferryid.diagnose.judging.experiment_design import manoeuvre
+from ferryid.diagnose.judging.difference import Difference
 from ferryid.diagnose.judging.finding import Rival
 from ferryid.diagnose.judging.group_loads import LoadDifference, load_differences
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
-from ferryid.effects.effect import Parameter
-from ferryid.effects.wording import listed, parameter_word, weak_evidence
+from ferryid.effects.effect import Effect
+from ferryid.effects.wording import listed, weak_evidence
 from ferryid.side_by_side import over
-from ferryid.vessel.circumstances import ANYWHERE, Circumstances
+from ferryid.vessel.circumstances import Circumstances
 from ferryid.vessel.profile import Profile
-
-
-@dataclass(frozen=True)
-class Difference:
-    """A property of one group relative to the other.
-
-    Attributes
-    ----------
-    candidate
-        The effect, and the group in whose logs it acts.
-    estimates
-        Its parameters.
-    evidence
-        Logarithm of the evidence over that of no such difference [nat].
-    scatter
-        Standard deviation between logs of one group, of the first parameter, in its unit.
-    smallest
-        By parameter, the distance from neutral that would have been seen with an even chance; None where none would.
-    gain, by_group
-        Held-out log-likelihood over that of no difference, of all logs and of each group; None where it was not selected.
-    rivals
-        What was tried in its place, with the evidence over it [nat].
-    doubt
-        Why it is not confirmed, as the end of a sentence; empty where it is.
-    circumstances
-        Where the logs were recorded, and what drives the vessel.
-    """
-
-    candidate: Candidate
-    estimates: Mapping[str, Estimate]
-    evidence: float
-    scatter: float
-    smallest: Mapping[str, float | None]
-    gain: Gain | None = None
-    by_group: Mapping[str, Gain] | None = None
-    rivals: tuple[Rival, ...] = ()
-    doubt: str = ""
-    circumstances: Circumstances = ANYWHERE
-
-    @property
-    def group(self) -> str:
-        """The group in whose logs it acts."""
-        return self.candidate.group
-
-    @property
-    def other(self) -> str:
-        """The group that it is relative to."""
-        return GROUPS[1 - GROUPS.index(self.group)]
-
-    @property
-    def probability(self) -> float:
-        """Probability over none, by the evidence and the prior odds; a hint's at most where it is not confirmed."""
-        away = min(max(self.evidence - INFERENCE.prior_odds, -700.0), 700.0)
-        probability = 1.0 / (1.0 + exp(-away))
-        return min(probability, JUDGING.hint_probability) if self.doubt else probability
-
-    @property
-    def unresolved_with(self) -> tuple[str, ...]:
-        """Effects that explain the same about as well."""
-        near = [one.effect for one in self.rivals if one.delta_score > -JUDGING.unresolved_evidence]
-        return tuple(dict.fromkeys(near))
-
-    @property
-    def separating_manoeuvre(self) -> str | None:
-        """What to record to separate it from these."""
-        return manoeuvre(self.candidate.effect.id, self.unresolved_with, self.circumstances)
-
-    @property
-    def says(self) -> str:
-        """The difference as a sentence."""
-        parts = [self.said(one) for one in self.candidate.parameters if one.name in self.estimates]
-        text = f"{self.title}, {self.group} relative to {self.other}: {', '.join(parts)}."
-        return f"{text} It is estimated, not confirmed: {self.doubt}." if self.doubt else text
-
-    @property
-    def title(self) -> str:
-        """What differs."""
-        return self.candidate.title
-
-    def seen_from(self, name: str) -> str:
-        """Return the smallest difference of a parameter that would have been seen, with its unit."""
-        least, label = self.smallest[name], parameter_word(name)
-        if least is None:
-            return f"{label} not seen at any size"
-        unit = next(each.unit for each in self.candidate.parameters if each.name == name)
-        return f"{label} {100.0 * least:.0f} %" if unit == "-" else f"{label} {float(f'{least:.2g}'):g} {unit}"
-
-    def said(self, parameter: Parameter) -> str:
-        """Return a parameter with its interval."""
-        one = self.estimates[parameter.name]
-        name = parameter_word(parameter.name)
-        if parameter.unit == "-":
-            return f"{name} {one.value:.3g} ({one.low:.3g} to {one.high:.3g})"
-        return f"{name} {one.value:+.3g} {one.unit} ({one.low:+.3g} to {one.high:+.3g})"
 
 
 @dataclass(frozen=True)
@@ -185,31 +91,74 @@ def judge_groups(campaign: Campaign, progress: Callable[[str], None]) -> JudgedG
     progress("testing the differences on held-out stretches")
     judged = [judged_difference(made, one, contenders) for one, contenders in found]
     judged.sort(key=lambda one: (bool(one.doubt), -one.evidence))
-    taken = {one.candidate.key for one in judged}
+    taken = {one.key for one in judged}
     # One that may act in either group is shown once: its estimate has the other sign.
     rest = {one.key: one for one in differences_of(made.campaign) if one.key not in taken}.values()
     compared = over(partial(compare_near, made), rest)
     return JudgedGroups(
         tuple(judged),
-        tuple(_difference(made, one, True) for one in compared),
+        tuple(_difference(made, one, near=True) for one in compared),
         tuple(one for one in made.campaign.properties if not one.group),
         load_differences(conditions.tests, made.campaign),
         float(np.sqrt(made.disagreement)),
     )
 
 
+def beside_sensors(judged: JudgedGroups, sensors: Sequence[Difference], *, hull_known: bool) -> JudgedGroups:
+    """Return what groups differ in with what their sensors show, without what forces say of the same where sensors differ.
+
+    Beside a hull that comes from the same logs, an error of the navigation that forces show and the sensors contradict is
+    doubtful: the hull is off in some manoeuvres, and groups differ in these.
+    """
+    selected = [one for one in sensors if one.selected]
+    of_sensors = {one.key for one in selected}
+    forces = judged.differences
+    if not hull_known:
+        forces = tuple(replace(one, doubt=one.doubt or _unseen_by_sensors(one, sensors)) for one in judged.differences)
+    differences = sorted([*selected, *forces], key=lambda one: (bool(one.doubt), -one.evidence))
+    compared = [one for one in judged.compared if one.key not in of_sensors]
+    compared += [one for one in sensors if not one.selected]
+    return replace(judged, differences=tuple(differences), compared=tuple(compared))
+
+
+def _unseen_by_sensors(one: Difference, sensors: Sequence[Difference]) -> str:
+    """Return that sensors, compared with each other, show no such difference, as the end of a sentence; empty where they do."""
+    for other in sensors:
+        if other.key == one.key and not _overlap(one, other):
+            return (
+                f"the hull comes from the same logs, and the sensors, compared with each other, show no such difference "
+                f"({other.values})"
+            )
+    return ""
+
+
+def _overlap(one: Difference, other: Difference) -> bool:
+    return all(
+        each.low <= other.estimates[name].high and other.estimates[name].low <= each.high
+        for name, each in one.estimates.items()
+        if name in other.estimates
+    )
+
+
 def judged_difference(made: CampaignFit, candidate: Candidate, contenders: Sequence[Contender]) -> Difference:
     """Return what supports a difference of an estimate."""
     without = without_property(made, candidate)
-    found = _difference(made, compare_estimated(made, candidate, without), False)
+    found = _difference(made, compare_estimated(made, candidate, without))
     before, after = held_out_loss(without), held_out_loss(made)
     gains = after.gain(before)
     groups = np.array([made.campaign.members[i].group for i in after.log])
     by_group = {group: Gain.of(gains[groups == group]) for group in GROUPS}
-    found = replace(found, gain=Gain.of(gains), by_group=by_group, rivals=_rivals(candidate, contenders))
     profile = made.campaign.members[0].plain.measurements.profile
-    found = replace(found, circumstances=Circumstances.of(profile))
-    return replace(found, doubt=_doubt(found, made.campaign.hull.known, profile))
+    found = replace(
+        found,
+        selected=True,
+        gain=Gain.of(gains),
+        by_group=by_group,
+        rivals=_rivals(candidate, contenders),
+        instead=tuple(_difference(made, one.comparison) for one in contenders if one.comparison is not None),
+        circumstances=Circumstances.of(profile),
+    )
+    return replace(found, doubt=_doubt(found, candidate.effect, made.campaign.hull.known, profile))
 
 
 def _rivals(candidate: Candidate, contenders: Sequence[Contender]) -> tuple[Rival, ...]:
@@ -218,7 +167,7 @@ def _rivals(candidate: Candidate, contenders: Sequence[Contender]) -> tuple[Riva
     return tuple(sorted(kept.values(), key=lambda one: -one.delta_score))
 
 
-def _doubt(one: Difference, hull_known: bool, profile: Profile) -> str:
+def _doubt(one: Difference, effect: Effect, hull_known: bool, profile: Profile) -> str:
     assert one.gain is not None
     assert one.by_group is not None
     if one.evidence < INFERENCE.prior_odds:
@@ -229,21 +178,21 @@ def _doubt(one: Difference, hull_known: bool, profile: Profile) -> str:
         if gain.high < 0.0:
             return f"held-out stretches of group {group} are predicted worse with it"
     values = {name: each.value for name, each in one.estimates.items()}
-    if doubt := value_doubt(one.candidate.effect, one.candidate.parameters, values, profile):
+    if doubt := value_doubt(effect, one.parameters, values, profile):
         return doubt
     if not _excludes(one):
         return "no interval excludes that there is none"
-    if one.candidate.effect.id in OF_HULL and not hull_known:
+    if effect.id in OF_HULL and not hull_known:
         return "the damping that it multiplies is known from the same logs only"
     return ""
 
 
 def _excludes(one: Difference) -> bool:
-    neutral = {each.name: each.neutral for each in one.candidate.parameters}
+    neutral = {each.name: each.neutral for each in one.parameters}
     return any(each.low > neutral[name] or each.high < neutral[name] for name, each in one.estimates.items())
 
 
-def _difference(made: CampaignFit, one: Comparison, near: bool) -> Difference:
+def _difference(made: CampaignFit, one: Comparison, *, near: bool = False) -> Difference:
     """Return a comparison for people: parameters that mean something, in their units."""
     candidate = one.candidate
     hidden: set[str] = set()
@@ -259,7 +208,7 @@ def _difference(made: CampaignFit, one: Comparison, near: bool) -> Difference:
             estimates[each.name] = Estimate.normal(float(value), float(error), each.unit)
             smallest[each.name] = float(least) if isfinite(least) else None
     size = candidate.parameters[0].size
-    return Difference(candidate, estimates, one.evidence, one.scatter * size, smallest)
+    return Difference.of(candidate, estimates, one.evidence, one.scatter * size, smallest, made.disagreement)
 
 
 def notes_of(judged: JudgedGroups, campaign: Campaign) -> tuple[str, ...]:
@@ -322,6 +271,11 @@ def summary(judged: JudgedGroups) -> str:
     also = f" They differ in {listed(loads)}." if loads else ""
     if not judged.differences:
         return f"No difference of the vessel found between the groups.{also}"
-    parts = [*([f"{counted(len(sure), 'difference')} confirmed"] if sure else [])]
+    open_ = sum(bool(one.unresolved_with) for one in sure)
+    known = f"{counted(len(sure), 'difference')} confirmed"
+    if open_:
+        whose = "its cause" if len(sure) == 1 else f"the cause of {open_}"
+        known = f"{known}, {whose} being one of several that these logs cannot tell apart,"
+    parts = [known] if sure else []
     parts += [f"{counted(hints, 'difference')} estimated, not confirmed"] if hints else []
     return f"{' and '.join(parts)} between the groups.{also}"

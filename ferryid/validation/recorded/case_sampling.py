@@ -21,9 +21,9 @@ from ferryid.validation.recorded.log import RecordedLog, cached_log
 from ferryid.validation.recorded.manifest import Recording
 from ferryid.validation.recorded.oracle_size import baselines, oracle_size, sizes_in
 
-KINDS = ("clean", "single", "span", "pair", "gross")
-"""Kinds of cells: recordings as they are, one effect all along, one that begins within the recording, two together, and records
-that are wrong altogether."""
+KINDS = ("clean", "single", "span", "pair", "gross", "changed")
+"""Kinds of cells: recordings as they are, one effect all along, one that begins within the recording, two together, records
+that are wrong altogether, and one effect in a group of recordings that another one lacks."""
 PAIRS = (
     ("thruster_gain", "heading_bias"),
     ("thruster_gain", "lever_arm"),
@@ -113,6 +113,8 @@ def sample_recorded(recordings: Sequence[Recording], seed: int, runs: float, onl
         try:
             logs = logs_of(recording)
             check_length(recording, logs)
+            for path in recording.before:
+                cached_log(path, recording.vessel)
         except FerryIdError as error:
             lacking.append(NotMade(recording.name, "", 0.0, str(error)))
             continue
@@ -123,7 +125,7 @@ def sample_recorded(recordings: Sequence[Recording], seed: int, runs: float, onl
             made, not_made = _of_effect(recording, logs, one, seed, runs * recording.runs, only)
             cases += made
             lacking += not_made
-        for pair in PAIRS if not only or "pair" in only else ():
+        for pair in PAIRS if (not only or "pair" in only) and not recording.before else ():
             cases += _of_pair(recording, logs, pair, seed, runs * recording.runs)
     if not cases:
         raise FerryIdError(f"--real: no recording can be used. The first: {lacking[0].why}")
@@ -186,9 +188,12 @@ def _of_effect(
     runs: float,
     only: Sequence[str],
 ) -> tuple[list[Case], list[NotMade]]:
-    kinds = {"single": LEVELS * runs, "span": runs if one.time_limited and len(logs) == 1 else 0.0}
+    alone = len(logs) == 1 and not recording.before
+    kinds = {"single": LEVELS * runs, "span": runs if one.time_limited and alone else 0.0}
+    if recording.before:
+        kinds = {"changed": LEVELS * runs}
     if one.gross:
-        kinds = {"gross": runs if len(logs) == 1 else 0.0}
+        kinds = {"gross": runs if alone else 0.0}
     wanted = {kind: many for kind, many in kinds.items() if many and (not only or {kind, one.id} & set(only))}
     if not wanted or (recording.only and one.id not in recording.only):
         return [], []
@@ -271,18 +276,20 @@ def _drawn(
         return _case(recording, logs, one.id, kind, rng, one.sample(0.0, logs[0], rng, (None, None)))
     level = TURNS[number % LEVELS]
     multiple = MULTIPLES[level] * float(MULTIPLES[1] / MULTIPLES[0]) ** (SPREAD * rng.uniform())
-    if kind != "single":
+    later = kind == "span"
+    if later:
         multiple = float(np.exp(rng.uniform(*np.log(LARGE))))
-    begin = None if kind == "single" else float(rng.uniform(*LATER)) * logs[0].duration_s
+    begin = float(rng.uniform(*LATER)) * logs[0].duration_s if later else None
     truth_of = _truth_of(logs, one, rng, begin)
-    known = sizes_in(one, baselines(recording.logs, recording.vessel), truth_of)
+    before = baselines(recording.before, recording.vessel)
+    known = sizes_in(one, baselines(recording.logs, recording.vessel), truth_of, before)
     least = known.oracle
     size, most = multiple * least, one.sizes(logs[0])[1]
     if size > most:
         seen = "an oracle sees none" if isinf(least) else f"an oracle needs {least:.3g} {one.unit}"
         text = f"{one.id} of {multiple:.2g} times the oracle's size was not made in {recording.name}: {seen},"
         return NotMade(recording.name, one.id, 0.0, f"{text} and sizes end at {most:.3g} {one.unit}.")
-    case = _case(recording, logs, one.id, kind, rng, truth_of(size), level if kind == "single" else None, size)
+    case = _case(recording, logs, one.id, kind, rng, truth_of(size), None if later else level, size)
     return replace(case, oracle_size=least, distinct_size=known.distinct, allowed=one.allowed)
 
 
@@ -307,6 +314,7 @@ def _case(
         level=level,
         size=size,
         truths=() if truth is None else (truth,),
+        before=len(recording.before),
     )
 
 

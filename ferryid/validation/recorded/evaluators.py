@@ -13,6 +13,7 @@ from ferryid.validation.case import Case
 from ferryid.validation.interfaces import Evaluator, Pipeline, Trial
 from ferryid.validation.log_generation import LogFiles
 from ferryid.validation.recorded.case_sampling import NotMade, concealed, logs_of, sample_recorded
+from ferryid.validation.recorded.log import cached_log
 from ferryid.validation.recorded.manifest import Recording, fingerprint, load_recordings
 from ferryid.validation.recorded.writing import write_log
 from ferryid.validation.records import RIVALS, CaseResult, RivalDiagnoses
@@ -73,12 +74,14 @@ def generate_recorded(recordings: Sequence[Recording], case: Case, folder: Path,
     logs = logs_of(recording)
     profile = folder / "vessel.toml"
     write_text(profile, logs[0].profile.text)
-    paths = []
+    paths, before = [], []
+    for number, path in enumerate(recording.before):
+        before.append(write_log(cached_log(path, recording.vessel), folder, f"{case.name}-before-{number:02d}"))
     for number, log in enumerate(logs):
         for truth in case.truths:
             log = concealed(log, truth, case.seed).log
         paths.append(write_log(log, folder, case.name if len(logs) == 1 else f"{case.name}-{number:02d}"))
-    return LogFiles(paths[0], profile, tuple(paths[1:]))
+    return LogFiles(paths[0], profile, tuple(paths[1:]), tuple(before))
 
 
 def nothing_realised(case: Case) -> dict[str, dict[str, float]]:
@@ -87,12 +90,12 @@ def nothing_realised(case: Case) -> dict[str, dict[str, float]]:
 
 
 def evaluate_rivals(recordings: Sequence[Recording], trial: Trial) -> RivalDiagnoses | None:
-    """Return what rivals name in a log; nothing of a campaign, as they take one log."""
+    """Return what rivals name in a log; nothing of a campaign or of two groups, as they take one log."""
     from ferryid.validation.rivals.naming import diagnoses
     from ferryid.vessel import load_profile
 
     recording = next(one for one in recordings if one.name == trial.case.path)
-    if len(recording.logs) > 1:
+    if len(recording.logs) > 1 or recording.before:
         return None
     return diagnoses(str(trial.log), load_profile(trial.profile), trial.folder / "rivals")
 

@@ -14,7 +14,7 @@ from ferryid.validation.recorded.effects import concealments
 from ferryid.validation.recorded.log import name_of_log
 
 SCHEMA = "ferryid.recordings/1"
-KEYS = ("name", "log", "campaign", "vessel", "runs", "only")
+KEYS = ("name", "log", "campaign", "before", "vessel", "runs", "only")
 LARGEST_BYTES = 1 << 20
 MOST_RUNS = 1e3
 
@@ -35,6 +35,8 @@ class Recording:
         Factor on the number of runs: fewer for a recording whose diagnosis takes long.
     only
         Effects that are concealed in it; every one if empty.
+    before
+        Paths of logs of the same vessel that stay as they are: what is concealed is to be found as what changed since.
     """
 
     name: str
@@ -42,6 +44,7 @@ class Recording:
     vessel: str
     runs: float = 1.0
     only: tuple[str, ...] = ()
+    before: tuple[str, ...] = ()
 
 
 def load_recordings(real: str, vessel: str | None) -> tuple[Recording, ...]:
@@ -80,8 +83,8 @@ def fingerprint(recordings: Sequence[Recording]) -> str:
     """Return a hash of names, vessels, and names and sizes of files: what tells one set of recordings from another."""
     digest = sha256()
     for one in recordings:
-        digest.update(repr((one.name, one.vessel, one.runs, one.only)).encode())
-        for log in one.logs:
+        digest.update(repr((one.name, one.vessel, one.runs, one.only, len(one.before))).encode())
+        for log in (*one.logs, *one.before):
             for part in [log] if Path(log).exists() else log.split("+"):
                 root = Path(part)
                 files = sorted(path for path in root.rglob("*") if path.is_file()) if root.is_dir() else [root]
@@ -124,6 +127,9 @@ def _entry(path: Path, number: int, entry: Mapping[str, Any]) -> Recording:
         logs = [logs]
     if ("log" in entry) == ("campaign" in entry) or not _texts(logs):
         raise FerryIdError(f'{where}: needs either log = "..." or campaign = ["...", ...]. Fix: give one of the two')
+    before = entry.get("before", [])
+    if not _texts(before) and before != []:
+        raise FerryIdError(f"{where}: before is a list of logs, found {before!r}. Fix: name logs, or leave it out")
     vessel = entry.get("vessel")
     if not isinstance(vessel, str) or not vessel:
         raise FerryIdError(f"{where}: needs vessel, found {vessel!r}. Fix: name a bundled profile or a TOML file")
@@ -145,9 +151,11 @@ def _entry(path: Path, number: int, entry: Mapping[str, Any]) -> Recording:
                 f"{did_you_mean(effect, concealments())} Fix: give some of {', '.join(concealments())}"
             )
     beside = path.parent
-    placed = ["+".join(str(beside / part) for part in log.split("+")) for log in logs]
+    placed, earlier = (
+        tuple("+".join(str(beside / part) for part in log.split("+")) for log in some) for some in (logs, before)
+    )
     profile = str(beside / vessel) if vessel.endswith(".toml") else vessel
-    return Recording(name, tuple(placed), profile, float(runs), tuple(only))
+    return Recording(name, placed, profile, float(runs), tuple(only), earlier)
 
 
 def _texts(value: Any) -> bool:

@@ -132,12 +132,28 @@ def baselines(logs: Sequence[str], vessel: str) -> list[Baseline]:
     return [cached_baseline(path, vessel) for path in logs]
 
 
-def sizes_in(one: Concealment, recording: Sequence[Baseline], truth_of: Callable[[float], Truth]) -> Sizes:
-    """Return the oracle's size of an effect, and that from which it is distinct from all others."""
-    least = oracle_size(one, recording, truth_of)
+def sizes_in(
+    one: Concealment,
+    recording: Sequence[Baseline],
+    truth_of: Callable[[float], Truth],
+    before: Sequence[Baseline] = (),
+) -> Sizes:
+    """Return the oracle's size of an effect, and that from which it is distinct from all others.
+
+    With logs before, in which it does not act, one who is not told which effect it is knows no more of the level that both
+    groups share than of the hull.
+    """
+
+    def seen_by_all(one: Concealment, recording: Sequence[Baseline], truth: Truth) -> float:
+        return distinctness(one, recording, truth, before)
+
+    def seen_by_oracle(one: Concealment, recording: Sequence[Baseline], truth: Truth) -> float:
+        return visibility(one, recording, truth, before)
+
+    least = oracle_size(one, recording, truth_of, seen_by_oracle)
     kinematic = any(one.visible is not None and one.visible(base.log) is not None for base in recording)
     # Kinematics is fitted with all errors of the sensors at once.
-    distinct = least if kinematic else max(least, oracle_size(one, recording, truth_of, distinctness))
+    distinct = least if kinematic else max(least, oracle_size(one, recording, truth_of, seen_by_all))
     return Sizes(least, min(distinct, SEARCHED * one.sizes(recording[0].log)[1]))
 
 
@@ -180,33 +196,45 @@ def oracle_size(
     return size
 
 
-def visibility(one: Concealment, recording: Sequence[Baseline], truth: Truth) -> float:
+def visibility(one: Concealment, recording: Sequence[Baseline], truth: Truth, before: Sequence[Baseline] = ()) -> float:
     """Return how far an effect is beyond what an oracle sees, 1 where it just does.
 
     It is the smaller of two ratios: of the deviation in standard deviations to `SIGMAS`, and of what the vessel moves by it, or
-    of its parameter, to the least that a diagnosis reports.
+    of its parameter, to the least that a diagnosis reports. Logs `before`, in which it does not act, share the hull.
     """
     change = _change(one, recording, truth)
-    hull = np.vstack([base.problem.by_hull for base in recording])
-    deviation = sqrt(2.0 * change.gain) if change.unsteady else _beside(change.white, hull)
+    hull = np.vstack([base.problem.by_hull for base in (*recording, *before)])
+    deviation = sqrt(2.0 * change.gain) if change.unsteady else _beside(_and_none(change.white, before), hull)
     return min(deviation / SIGMAS, change.moved / INFERENCE.void_share, _over_least(one, truth))
 
 
-def distinctness(one: Concealment, recording: Sequence[Baseline], truth: Truth) -> float:
+def distinctness(
+    one: Concealment, recording: Sequence[Baseline], truth: Truth, before: Sequence[Baseline] = ()
+) -> float:
     """Return how far an effect is beyond what one sees who is not told which it is, 1 where it just shows.
 
     Of a random push the spectrum alone is known, which no other effect has: it is as distinct as it is visible.
     """
     change = _change(one, recording, truth)
     if change.unsteady:
-        return visibility(one, recording, truth)
-    conditions = _conditions(recording, truth)
-    alone = _beside(change.white, np.hstack([_of_any_hull(recording), *conditions])) / SIGMAS
-    known, beside = [np.vstack([base.problem.by_hull for base in recording]), *conditions], inf
+        return visibility(one, recording, truth, before)
+    logs, white = [*recording, *before], _and_none(change.white, before)
+    conditions = _conditions(logs, truth)
+    # A level that both groups have in common.
+    common = [_stacked(logs, [base.responses[0] for base in logs], truth.key)] if before else []
+    alone = _beside(white, np.hstack([_of_any_hull(logs), *conditions, *common])) / SIGMAS
+    known, beside = [np.vstack([base.problem.by_hull for base in logs]), *conditions, *common], inf
+    none = [dict[Key, Floats]()] * len(before)
     for every in zip(*(base.responses for base in recording), strict=True):
         for key in {key for one in every for key in one} - {truth.key}:
-            beside = min(beside, _beside(change.white, np.hstack([*known, _stacked(recording, every, key)])))
+            others = _stacked(logs, [*every, *none], key)
+            beside = min(beside, _beside(white, np.hstack([*known, others])))
     return min(alone, beside / APART, change.moved / INFERENCE.void_share, _over_least(one, truth))
+
+
+def _and_none(white: Floats, before: Sequence[Baseline]) -> Floats:
+    """Return whitened changes of logs with those of logs before them, in which nothing changes."""
+    return np.concatenate([white, *(np.zeros(len(base.problem.by_hull)) for base in before)])
 
 
 def _of_any_hull(recording: Sequence[Baseline]) -> Floats:

@@ -31,7 +31,8 @@ def own_errors(recordings: Sequence[Recording], used: Iterable[tuple[str, str]])
     wanted = {key for key in used if concealments()[key[1]].family == SENSOR}
     made = dict[tuple[str, str], Mapping[str, float]]()
     for recording in recordings:
-        effects = {effect for name, effect in wanted if name == recording.name}
+        # Of two groups each has them.
+        effects = {effect for name, effect in wanted if name == recording.name and not recording.before}
         if effects:
             found = [_errors(log) for log in logs_of(recording)]
             made |= {(recording.name, effect): _mean([one.get(effect, {}) for one in found]) for effect in effects}

@@ -49,7 +49,7 @@ def page(result: Mapping[str, Any], scores: RecordedScores) -> str:
         Of its cases.
     """
     known = concealments()
-    tried = {one.effect for one in scores.responses} | {one.effect for one in scores.gross}
+    tried = {one.effect for one in (*scores.responses, *scores.changes, *scores.gross)}
     context = {
         "scores": scores,
         "cases": counted(scores.runs, "case"),
@@ -84,7 +84,10 @@ def page(result: Mapping[str, Any], scores: RecordedScores) -> str:
         "not_made": _not_made(scores),
         "by_family": _by_family(scores),
         "multiples": [f"{one:g}" for one in MULTIPLES],
-        "by_multiple": _by_multiple(scores),
+        "by_multiple": _by_multiple(scores.responses),
+        "changes": [_row(one) for one in scores.changes],
+        "changes_by_multiple": _by_multiple(scores.changes),
+        "changes_from_twice_distinct": from_twice_distinct(scores.changes),
         "from_twice_distinct": from_twice_distinct(scores.responses),
         "distinct_by_family": _distinct_by_family(scores),
         "figures": figures(scores),
@@ -143,9 +146,9 @@ def _detected(one: Doses) -> Detected:
     )
 
 
-def _by_multiple(scores: RecordedScores) -> list[tuple[str, ...]]:
+def _by_multiple(responses: Sequence[DoseResponse]) -> list[tuple[str, ...]]:
     """Return for each family, each effect and all how many doses were named at each multiple of the oracle's size."""
-    known, every = concealments(), [one.doses for one in scores.responses]
+    known, every = concealments(), [one.doses for one in responses]
     rows = [("all", joined("all", every))]
     for family, title in FAMILIES.items():
         mine = [one for one in every if known[one.effect].family == family]

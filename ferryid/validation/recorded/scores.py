@@ -267,6 +267,8 @@ class RecordedScores(Record):
         The diagnosis beside other methods, on the cases on which these were run.
     missed
         Effects of twice the oracle's size or more that were not named.
+    changes
+        As `responses`, of effects in a group of recordings that another group lacks.
     """
 
     runs: int
@@ -287,6 +289,7 @@ class RecordedScores(Record):
     gross: tuple[Gross, ...] = ()
     rivals: tuple[RivalScores, ...] = ()
     missed: tuple[Missed, ...] = ()
+    changes: tuple[DoseResponse, ...] = ()
 
 
 def score_recorded(
@@ -314,7 +317,7 @@ def score_recorded(
     return RecordedScores(
         len(results),
         tuple(_unaltered(one) for one in plain.values()),
-        _responses(altered, plain),
+        _responses(altered, plain, "single"),
         tuple(_later(one, plain[one.case.path]) for one in fresh if one.case.kind == "span"),
         tuple(moved for one in altered if one.case.kind == "single" for moved in _moved(one, plain[one.case.path])),
         Share(sum({truth.key for truth in one.truths} <= set(names(one)) for one in differences), len(differences)),
@@ -329,7 +332,8 @@ def score_recorded(
         tuple(_paired(one, plain[one.case.path]) for one in fresh if one.case.kind == "pair"),
         tuple(_gross(one) for one in broken),
         rival_scores([one for one in results if one.case.kind != GROSS], _beside_plain, concealments()),
-        tuple(_missed(one, plain[one.case.path]) for one in fresh if one.case.kind == "single" and _is_missed(one)),
+        tuple(_missed(one, plain[one.case.path]) for one in fresh if one.case.level is not None and _is_missed(one)),
+        _responses(altered, plain, "changed"),
     )
 
 
@@ -402,6 +406,7 @@ def recorded_targets(scores: RecordedScores) -> list[Target]:
     error = every.median_error
     twice = joined("all", (one.doses for one in scores.responses)).at_twice
     distinct = from_twice_distinct(scores.responses)
+    changed = joined("all", (one.doses for one in scores.changes)).at_twice
     return [
         share_target(
             f"named rightly at twice the oracle's size: at least {100.0 * AT_TWICE:.0f} %", twice, at_least=AT_TWICE
@@ -415,6 +420,18 @@ def recorded_targets(scores: RecordedScores) -> list[Target]:
                 )
             ]
             if distinct.of
+            else []
+        ),
+        *(
+            [
+                share_target(
+                    f"what changed between two groups, named rightly at twice the oracle's size: at least "
+                    f"{100.0 * AT_TWICE:.0f} %",
+                    changed,
+                    at_least=AT_TWICE,
+                )
+            ]
+            if changed.of
             else []
         ),
         share_target(
@@ -451,10 +468,10 @@ def _unaltered(result: CaseResult) -> Unaltered:
     return Unaltered(case.path, case.vessel, verdict, diagnosis.seconds, named, hinted)
 
 
-def _responses(results: Sequence[CaseResult], plain: Mapping[str, CaseResult]) -> tuple[DoseResponse, ...]:
+def _responses(results: Sequence[CaseResult], plain: Mapping[str, CaseResult], kind: str) -> tuple[DoseResponse, ...]:
     sorted_by: dict[tuple[str, str], list[CaseResult]] = {}
     for result in results:
-        if result.case.kind == "single":
+        if result.case.kind == kind:
             sorted_by.setdefault((_effect(result.case), result.case.path), []).append(result)
     places = {name: place for place, name in enumerate(concealments())}
     keys = sorted(sorted_by, key=lambda key: (places[key[0]], key[1]))

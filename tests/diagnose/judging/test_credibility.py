@@ -403,8 +403,8 @@ def test_a_property_and_a_difference_that_are_not_credible_are_not_confirmed() -
     assert replace(test, credibility="nobody has such a thruster").doubt == "nobody has such a thruster"
     bound = {"factor": replace(estimates["value"], value=2.99, low=2.9, high=3.0)}
     gain = Gain(40.0, 10.0, 70.0)
-    apart = Difference(weak, bound, 50.0, 0.0, {}, gain, {"A": gain, "B": gain})
-    assert _doubt(apart, True, FERRY) == "its factor of 2.99 - stands at the bound of its search"
+    apart = replace(Difference.of(weak, bound, 50.0, 0.0, {}), gain=gain, by_group={"A": gain, "B": gain})
+    assert _doubt(apart, weak.effect, True, FERRY) == "its factor of 2.99 - stands at the bound of its search"
 
 
 def taught(hull: Any = None, doubt: str = "") -> Diagnosis:

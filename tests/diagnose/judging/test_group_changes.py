@@ -86,7 +86,7 @@ def test_a_load_in_either_group_is_a_load(a: float, b: float, group: str) -> Non
         groups([member(0, load=a), member(1, load=a)], [member(2, load=b), member(3, load=b)]), no_progress
     )
     (found,) = judged.sure
-    assert (found.candidate.effect.id, found.group) == ("payload", group)
+    assert (found.effect, found.group) == ("payload", group)
     assert found.estimates["mass"].low < 250.0 < found.estimates["mass"].high
     assert found.estimates["x"].value == pytest.approx(0.4, abs=0.2)
 
@@ -109,7 +109,7 @@ def test_all_thrusters_alike_are_one_difference() -> None:
         groups([member(0), member(1)], [member(2, (0.75, 0.75)), member(3, (0.75, 0.75))]), no_progress
     )
     (found,) = judged.differences
-    assert found.candidate.key == ("thruster_gain", ALL_THRUSTERS)
+    assert found.key == ("thruster_gain", ALL_THRUSTERS)
     assert "all actuators alike" in found.says
     assert found.estimates["factor"].low < 0.75 < found.estimates["factor"].high
 
@@ -126,7 +126,7 @@ def test_fouling_between_groups_needs_no_hull_model() -> None:
 def test_fouling_is_confirmed_beside_a_known_hull_and_a_hint_beside_none(known: bool) -> None:
     judged = judge_groups(groups([member(0)], [member(1, fouled=2.0)], known), no_progress)
     (found,) = judged.differences
-    assert found.candidate.effect.id == "fouling"
+    assert found.effect == "fouling"
     assert found.doubt == ("" if known else "the damping that it multiplies is known from the same logs only")
     assert (found.probability > JUDGING.hint_probability) == known
     assert judged.verdict == ("different" if known else "perhaps")

@@ -58,7 +58,7 @@ def judged(factors: tuple[float, ...], known: bool = True) -> JudgedGroups:
 @pytest.mark.parametrize("known", [True, False], ids=["hull known", "no hull model"])
 def test_a_thruster_that_is_weak_in_one_group_is_named_and_nothing_else(known: bool) -> None:
     found = judged((1.0, 1.0, 0.8), known)
-    assert [(one.candidate.key, one.group, one.doubt) for one in found.differences] == [(WEAK, "B", "")]
+    assert [(one.key, one.group, one.doubt) for one in found.differences] == [(WEAK, "B", "")]
     (one,) = found.sure
     factor = one.estimates["factor"]
     assert factor.low < 0.8 < factor.high
@@ -74,7 +74,7 @@ def test_a_thruster_that_is_weak_in_one_group_is_named_and_nothing_else(known: b
 def test_a_thruster_that_is_weak_in_the_group_named_first_is_the_same_beside_a_hull_that_is_known() -> None:
     """As a gain of the other group it was one of force beyond the thrust curve, and a lag stood in for it."""
     found = judged((0.7, 0.7, 1.0))
-    assert [(one.candidate.key, one.group, one.doubt) for one in found.differences] == [(WEAK, "A", "")]
+    assert [(one.key, one.group, one.doubt) for one in found.differences] == [(WEAK, "A", "")]
     factor = found.sure[0].estimates["factor"]
     assert factor.low < 0.7 < factor.high
     assert found.sure[0].says.startswith("Thruster force (thruster1), A relative to B: factor 0.7")
@@ -84,7 +84,7 @@ def test_groups_that_are_alike_differ_in_nothing_and_show_what_would_have_been_s
     found = judged((1.0, 1.0, 1.0))
     assert found.differences == ()
     assert found.verdict == "alike"
-    (gain,) = (one for one in found.compared if one.candidate.key == WEAK)
+    (gain,) = (one for one in found.compared if one.key == WEAK)
     least = gain.smallest["factor"]
     assert least is not None
     assert 0.0 < least < 0.2
@@ -174,9 +174,9 @@ def test_of_differences_that_logs_scatter_in_the_likeliest_over_alike_logs_is_se
 def test_parameters_and_sizes_are_told_in_words_and_plain_numbers() -> None:
     profile = load_profile("milliampere")
     late = Candidate.of(effects()["time_delay"], None, profile)
-    delay = Difference(late, {"seconds": Estimate(0.1, -0.2, 0.4, "s")}, 0.0, 0.1, {"seconds": None})
+    delay = Difference.of(late, {"seconds": Estimate(0.1, -0.2, 0.4, "s")}, 0.0, 0.1, {"seconds": None})
     assert delay.said(late.parameters[0]) == "delay +0.1 s (-0.2 to +0.4)"
     assert delay.seen_from("seconds") == "delay not seen at any size"
     load = Candidate.of(effects()["payload"], None, profile)
-    laden = Difference(load, {}, 0.0, 0.1, {"mass": 112.0})
+    laden = Difference.of(load, {}, 0.0, 0.1, {"mass": 112.0})
     assert laden.seen_from("mass") == "mass 110 kg"
