@@ -23,6 +23,7 @@ from ferryid.diagnose.inference.group_differences import GROUPS
 from ferryid.diagnose.inference.stages import AveragedLog
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.difference import SENSORS, Difference
+from ferryid.effects import effects
 from ferryid.effects.effect import Parameter
 from ferryid.side_by_side import over
 from ferryid.types import Flags, Floats
@@ -144,7 +145,7 @@ def _difference(
         effect=check.id,
         instance=None,
         group=GROUPS[1],
-        title=check.title,
+        title=f"{effects()[check.id].title} (sensors compared)" if check.id in effects() else check.title,
         parameters=tuple(parameters),
         estimates={one.name: _estimate(found[one.name], one.neutral, one.unit) for one in parameters},
         evidence=evidence,

@@ -49,7 +49,7 @@ def page(result: Mapping[str, Any], scores: RecordedScores) -> str:
         Of its cases.
     """
     known = concealments()
-    tried = {one.effect for one in (*scores.responses, *scores.changes, *scores.gross)}
+    tried = {one.effect for one in (*scores.responses, *scores.changes)} | {one.effect for one in scores.gross}
     context = {
         "scores": scores,
         "cases": counted(scores.runs, "case"),

@@ -73,7 +73,7 @@ def test_a_heading_that_is_off_in_one_group_is_a_difference_and_not_where_all_lo
     assert turned.shown_by == SENSORS
     assert turned.probability > 0.99
     assert turned.estimates["angle"].low < 3.0 < turned.estimates["angle"].high
-    assert turned.says.startswith("Heading against course over ground, B relative to A: angle +3 deg (")
+    assert turned.says.startswith("Heading bias (sensors compared), B relative to A: angle +3 deg (")
     same = _difference(HEADING, HEADING.lasting, estimates([3.0, 3.1, 3.1, 3.0], 0.1, "deg", "angle"), "AABB", 1.0)
     assert same is not None
     assert not same.selected
