@@ -51,7 +51,7 @@ OF_HULL = frozenset({"fouling"})
 """What a single log shows beside a hull model alone, and groups beside the hull that they share."""
 FAULTS = frozenset({"thruster_gain"})
 """Factors of force. One of the groups has less than the other: a loss in the one, as no actuator gains force of itself."""
-SCATTERS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4)
+SCATTERS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
 """Standard deviations between logs that are averaged over beside none, in sizes of a parameter."""
 
 
@@ -187,11 +187,12 @@ def _scaled(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMo
 
 
 def select_differences(
-    made: CampaignFit, progress: Callable[[str], None]
+    made: CampaignFit, progress: Callable[[str], None], unresolved: float
 ) -> tuple[CampaignFit, tuple[tuple[Candidate, tuple[Contender, ...]], ...]]:
     """Return the estimate with every difference that the evidence favours, and what contended with each.
 
-    What all logs share is selected beside them, so that a property of both groups is not taken for a difference.
+    What all logs share is selected beside them, so that a property of both groups is not taken for a difference. Of several that
+    are less than `unresolved` [nat] apart, by as much as the logs' noise explains of how they differ, the simplest stands first.
     """
     contenders: dict[Candidate, tuple[Contender, ...]] = {}
     while len(made.campaign.properties) < INFERENCE.most_effects:
@@ -214,11 +215,11 @@ def select_differences(
             without = without_property(made, earlier)
             if compare_estimated(made, earlier, without).evidence < INFERENCE.prior_odds:
                 made = without
-    return _in_place_of_each_other(made, contenders)
+    return _in_place_of_each_other(made, contenders, unresolved)
 
 
 def _in_place_of_each_other(
-    made: CampaignFit, contenders: dict[Candidate, tuple[Contender, ...]]
+    made: CampaignFit, contenders: dict[Candidate, tuple[Contender, ...]], unresolved: float
 ) -> tuple[CampaignFit, tuple[tuple[Candidate, tuple[Contender, ...]], ...]]:
     """Return an estimate with the likelier of each difference and what contended with it, now that all else is estimated.
 
@@ -239,7 +240,9 @@ def _in_place_of_each_other(
         # An interval that holds none is no name where another's does not.
         likely = [each for each in likely if tried[each][1].excludes_none] or likely
         if likely:
-            best = max(likely, key=lambda each: tried[each][1].over_alike)
+            least = max(tried[each][1].over_alike for each in likely) - unresolved * max(1.0, made.disagreement)
+            near = [each for each in likely if tried[each][1].over_alike >= least]
+            best = min(near, key=lambda each: (len(each.parameters), -tried[each][1].over_alike))
         behind = tried[best][1].over_alike
         rest = [
             Contender(each, min(here.over_alike - behind, 0.0), here)

@@ -81,7 +81,7 @@ def judge_groups(campaign: Campaign, progress: Callable[[str], None]) -> JudgedG
     """Judge in what two groups of logs differ: conditions, then differences beside them, then conditions beside these."""
     place = {str(i): i for i in range(len(campaign.members))}
     conditions = judge_conditions(campaign, place, progress)
-    made, found = select_differences(conditions.hull.fit, progress)
+    made, found = select_differences(conditions.hull.fit, progress, JUDGING.unresolved_evidence)
     if made.campaign.properties:
         before = made.campaign.conditions
         conditions = judge_conditions(replace(campaign, properties=made.campaign.properties), place, progress)

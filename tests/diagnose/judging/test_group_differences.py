@@ -166,7 +166,7 @@ def test_of_differences_that_logs_scatter_in_the_likeliest_over_alike_logs_is_se
     monkeypatch.setattr(inference, "compare_estimated", weighed)
     monkeypatch.setattr(inference, "_estimated", with_property)
     monkeypatch.setattr(inference, "INFERENCE", replace(INFERENCE, most_effects=1))
-    _, ((first, contenders),) = inference.select_differences(made, no_progress)
+    _, ((first, contenders),) = inference.select_differences(made, no_progress, 3.0)
     assert first.key == WEAK
     assert [(one.candidate.key, one.behind) for one in contenders] == [(("payload", None), -74.0)]
 
