@@ -289,15 +289,18 @@ def fit(
     acts = [order.index(i) for i, candidate in enumerate(candidates) for _ in candidate.parameters]
     # The hull's derivatives cost most: they are taken anew only now and then, and before the fit ends.
     moving, by_hull, of_hull = (problem.origin if begin is None else begin).by_free_hull
+    by_effects = np.empty((len(w), 0))
     both, fresh = np.concatenate([moving, h + free]), False
     square, many = np.ix_(both, both), len(moving)
     products = np.empty((len(both), len(both)))
+    # Where the derivatives by hull and by effects were taken: after a step that led nowhere they are the same again.
+    hull_taken, effects_taken = chain, list[ForceModel]()
     for count in range(max(steps, 1)):
-        if count > 0 and (bends or count % HULL_SLOPE_ITERATIONS == 0):
-            by_hull, fresh = problem.slopes_of(chain[-1], moving), True
+        if hull_taken is not chain and (bends or count % HULL_SLOPE_ITERATIONS == 0):
+            by_hull, hull_taken, fresh = problem.slopes_of(chain[-1], moving), chain, True
             of_hull = by_hull.T @ by_hull
-        by_effects = np.empty((len(w), 0))
-        if free.size:
+        if free.size and effects_taken is not chain:
+            effects_taken = chain
             d = np.where(z[h + free] + PARAMETER_DIFFERENCE <= high[free], PARAMETER_DIFFERENCE, -PARAMETER_DIFFERENCE)
             moved = np.repeat(z[None], len(free), axis=0)
             moved[np.arange(len(free)), h + free] += d
@@ -339,7 +342,7 @@ def fit(
         if gained < CONVERGED_GAIN:
             if fresh or steps <= HULL_SLOPE_ITERATIONS:
                 break
-            by_hull, fresh = problem.slopes_of(chain[-1], moving), True
+            by_hull, hull_taken, fresh = problem.slopes_of(chain[-1], moving), chain, True
             of_hull = by_hull.T @ by_hull
     covariance = np.asarray(np.linalg.inv(A)[h:, h:] * np.outer(size, size), dtype=np.float64)
     fitted = neutral + size * z[h:]
