@@ -14,6 +14,7 @@ from ferryid.diagnose.inference.autoregression import AutoregressiveNoise, fit_a
 from ferryid.diagnose.inference.candidate import Candidate as Candidate
 from ferryid.diagnose.inference.candidate import acting_order
 from ferryid.diagnose.inference.candidate import apply_candidates as apply_candidates
+from ferryid.diagnose.inference.folds import Folds, folds_of
 from ferryid.diagnose.inference.newton_step import newton_step
 from ferryid.diagnose.inference.noise_estimation import excerpt, fit_noise
 from ferryid.diagnose.inference.noise_model import NoiseModel, WhiteningFilter, make_whitening_filter
@@ -177,8 +178,23 @@ class EstimationProblem:
         return replace(self, noise=fit_autoregression(self.windows.gap(force_model), self.windows.runs), filter=own)
 
     def part(self, windows: Windows) -> EstimationProblem:
-        """Return the trial of some of its windows, with the same noise."""
-        return replace(self, windows=windows)
+        """Return the trial of some of its windows, with the same noise; the same one for the same windows."""
+        # A part holds its windows, so that no others come to have their id.
+        return self._parts.setdefault(id(windows), replace(self, windows=windows))
+
+    @cached_property
+    def folds(self) -> Folds | None:
+        """`ferryid.diagnose.inference.folds.folds_of` the windows."""
+        return folds_of(self.windows)
+
+    @cached_property
+    def _parts(self) -> dict[int, EstimationProblem]:
+        return {}
+
+    @cached_property
+    def bare_fits(self) -> dict[tuple[int, int], tuple[Fit, Fit]]:
+        """What `without` made already: by the id of a fit and the place of a candidate, that fit and the one without it."""
+        return {}
 
 
 @dataclass(frozen=True)
@@ -387,7 +403,16 @@ def without(problem: EstimationProblem, made: Fit, index: int) -> Fit:
 
     Of one that trades with the hull, such as a load, the posterior is a bent ridge: there the way from the profile's hull may
     end on a lower top than that from the hull beside which it was found.
+
+    Selection and judging ask for the same ones again: what was fitted once is kept.
     """
+    key = id(made), index % len(made.candidates)
+    if key not in problem.bare_fits:
+        problem.bare_fits[key] = made, _without(problem, made, index)
+    return problem.bare_fits[key][1]
+
+
+def _without(problem: EstimationProblem, made: Fit, index: int) -> Fit:
     candidates, values = rest_of(made, index)
     bare = fit(problem, candidates, values)
     if not any(one.effect.profiled for one in candidates):

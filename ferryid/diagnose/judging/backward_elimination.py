@@ -13,8 +13,8 @@ from ferryid.diagnose.judging.axis_consistency import check_axis_consistency
 from ferryid.diagnose.judging.credibility import interval_doubt
 from ferryid.diagnose.judging.held_out import HeldOutEvidence, held_out_evidence
 from ferryid.diagnose.judging.rivals import (
+    Contest,
     RivalComparison,
-    compare_rivals,
     redundant_shape,
     with_both,
     without_companions,
@@ -76,10 +76,10 @@ def eliminate_backward(
     kept, swaps = found, 0
     while kept.candidates:
         progress("weighing rivals")
-        standings = tuple(compare_rivals(problem, kept, i, library) for i in range(len(kept.candidates)))
-        better = [(i, one) for i, standing in enumerate(standings) for one in standing.rivals[:1] if one.gain > 0.0]
-        better = [(i, one) for i, one in better if one.fit.keys not in tried]
-        if better and swaps < JUDGING.most_replacements:
+        contests = [Contest(problem, kept, i, library) for i in range(len(kept.candidates))]
+        likelier = [one.likelier() for one in contests] if swaps < JUDGING.most_replacements else []
+        better = [(i, one) for i, one in enumerate(likelier) if one is not None and one.fit.keys not in tried]
+        if better:
             # What was selected first may be less likely beside what was selected later than another in its place.
             replaced, best = max(better, key=lambda pair: pair[1].gain)
             tried.add(best.fit.keys)
@@ -92,7 +92,7 @@ def eliminate_backward(
         fallen, why = _fallen(problem, kept, proof)
         if fallen is None:
             # What fell may have been right: it is no rival of what is likely beside it.
-            standings = tuple(without_companions(problem, kept, i, one) for i, one in enumerate(standings))
+            standings = tuple(without_companions(problem, kept, i, one.comparison()) for i, one in enumerate(contests))
             return Elimination(kept, proof, standings, _told(fallen_by_reason))
         if why:
             fallen_by_reason.setdefault(why, []).append(kept.candidates[fallen].title)

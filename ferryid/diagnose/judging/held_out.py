@@ -28,7 +28,7 @@ from ferryid.diagnose.inference.estimation import (
     rest_of,
     starting_point,
 )
-from ferryid.diagnose.inference.folds import Folds, by_block, draws, folds_of, subset
+from ferryid.diagnose.inference.folds import Folds, by_block, draws, subset
 from ferryid.diagnose.inference.force_errors import force_errors, mass_of
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.free_runs import FreeRuns, free_runs
@@ -142,7 +142,7 @@ def held_out_evidence(problem: EstimationProblem, found: Fit) -> HeldOutEvidence
     found
         The hypothesis, fitted to the whole log.
     """
-    folds = folds_of(problem.windows)
+    folds = problem.folds
     if folds is None:
         return None
     base = held_out(problem, folds, ())
@@ -161,7 +161,7 @@ def held_out(
     folds: Folds,
     candidates: Sequence[Candidate],
     start: Sequence[Floats] | None = None,
-    beside: Fit | None = None,
+    beside: Fit | Sequence[Fit] | None = None,
 ) -> HeldOut:
     """Return what a hypothesis leaves of the gaps of windows it was not fitted to.
 
@@ -179,7 +179,7 @@ def held_out(
     own_start = tuple(one.start for one in candidates) if start is None else tuple(start)
 
     def made_of(training: Windows) -> Fit:
-        part = _part(problem, training)
+        part = problem.part(training)
         begin = (
             None
             if beside is None
@@ -378,10 +378,6 @@ def _hull_strains(
         for one in (without, found)
     ]
     return without.evidence < found.evidence - least and strains[0] > strains[1] + 2.0 * least
-
-
-def _part(problem: EstimationProblem, windows: Windows) -> EstimationProblem:
-    return problem.part(windows)
 
 
 def _gains(problem: EstimationProblem, folds: Folds, before: Floats, after: Floats) -> Floats:
