@@ -161,7 +161,7 @@ def held_out(
     folds: Folds,
     candidates: Sequence[Candidate],
     start: Sequence[Floats] | None = None,
-    beside: Fit | Sequence[Fit] | None = None,
+    beside: Fit | None = None,
 ) -> HeldOut:
     """Return what a hypothesis leaves of the gaps of windows it was not fitted to.
 
