@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values
-from ferryid.effects.force_model import ForceModel
+from ferryid.effects.force_model import ForceModel, touches
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
@@ -19,6 +19,7 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     return (Parameter("seconds", "s", 0.3, -3.0, 3.0),)
 
 
+@touches("parts")
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Look the actuators' forces up at the time that the motion was measured at."""
     if p[0] == 0.0:

@@ -271,13 +271,22 @@ def fit(
 
     def chain_of(z: Floats) -> list[ForceModel]:
         """Return the force model of the hull alone, and with each further candidate in the order in which they act."""
-        return extended([replace(problem.plain, hull=problem.plain.hull + problem.hull_spread * z[:h])], z)
-
-    def extended(chain: list[ForceModel], z: Floats) -> list[ForceModel]:
-        values = neutral + size * z[h:]
-        for i in order[len(chain) - 1 :]:
+        chain, values = (
+            [replace(problem.plain, hull=problem.plain.hull + problem.hull_spread * z[:h])],
+            neutral + size * z[h:],
+        )
+        for i in order:
             chain.append(candidates[i].act(chain[-1], values[own[i]]))
         return chain
+
+    def moved_from(chain: Sequence[ForceModel], z: Floats, turn: int) -> ForceModel:
+        """Return the force model with parameters elsewhere of the candidate that has a turn: what acts before is as it was."""
+        values = neutral + size * z[h:]
+        made = candidates[order[turn]].act(chain[turn], values[own[order[turn]]])
+        for later in range(turn + 1, len(order)):
+            i = order[later]
+            made = candidates[i].act_again(made, values[own[i]], chain[later], chain[later + 1])
+        return made
 
     def white(chain: Sequence[ForceModel]) -> Floats:
         return problem.white(chain[-1])
@@ -320,8 +329,7 @@ def fit(
             d = np.where(z[h + free] + PARAMETER_DIFFERENCE <= high[free], PARAMETER_DIFFERENCE, -PARAMETER_DIFFERENCE)
             moved = np.repeat(z[None], len(free), axis=0)
             moved[np.arange(len(free)), h + free] += d
-            # What acts before a candidate is as it was.
-            there = [extended(chain[: 1 + acts[k]], one)[-1] for k, one in zip(free.tolist(), moved, strict=True)]
+            there = [moved_from(chain, one, acts[k]) for k, one in zip(free.tolist(), moved, strict=True)]
             gaps = np.stack([problem.steps.gap(one) for one in there], axis=2)
             by_effects = (problem.whitening_filter.white(gaps) - w[:, None]) / d
         across = by_hull.T @ by_effects
