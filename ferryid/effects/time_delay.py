@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.compiled import compiled
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import ForceModel, touches
 from ferryid.effects.thresholds import EFFECTS
@@ -25,11 +26,25 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
     if p[0] == 0.0:
         return force_model
     t = force_model.measurements.t
-    shape = force_model.parts.shape
-    flat = force_model.parts.reshape(len(t), -1)
-    when = t - p[0]
-    parts = np.column_stack([np.interp(when, t, column) for column in flat.T]).reshape(shape)
-    return replace(force_model, parts=parts)
+    flat = np.ascontiguousarray(force_model.parts).reshape(len(t), -1)
+    return replace(force_model, parts=_looked_up(flat, t, t - p[0]).reshape(force_model.parts.shape))
+
+
+@compiled
+def _looked_up(values: Floats, t: Floats, when: Floats) -> Floats:
+    """Return values, shape (n, c), at increasing times by linear interpolation between those of their rows, held at the ends."""
+    out = np.empty((when.shape[0], values.shape[1]))
+    last, j = t.shape[0] - 1, 0
+    for i in range(when.shape[0]):
+        while j < last and t[j + 1] <= when[i]:
+            j += 1
+        inside = j < last and when[i] > t[0]
+        share = (when[i] - t[j]) / (t[j + 1] - t[j]) if inside else 0.0
+        for c in range(values.shape[1]):
+            out[i, c] = values[j, c]
+            if inside:
+                out[i, c] += share * (values[j + 1, c] - values[j, c])
+    return out
 
 
 def says(values: Values, instance: str | None) -> str:
