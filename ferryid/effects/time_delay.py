@@ -32,18 +32,17 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
 
 @compiled
 def _looked_up(values: Floats, t: Floats, when: Floats) -> Floats:
-    """Return values, shape (n, c), at increasing times by linear interpolation between those of their rows, held at the ends."""
+    """Return values, shape (n, c), at increasing times, linear between those of their rows and held at the ends."""
     out = np.empty((when.shape[0], values.shape[1]))
     last, j = t.shape[0] - 1, 0
     for i in range(when.shape[0]):
         while j < last and t[j + 1] <= when[i]:
             j += 1
-        inside = j < last and when[i] > t[0]
-        share = (when[i] - t[j]) / (t[j + 1] - t[j]) if inside else 0.0
+        following, share = j, 0.0
+        if j < last and when[i] > t[0]:
+            following, share = j + 1, (when[i] - t[j]) / (t[j + 1] - t[j])
         for c in range(values.shape[1]):
-            out[i, c] = values[j, c]
-            if inside:
-                out[i, c] += share * (values[j + 1, c] - values[j, c])
+            out[i, c] = values[j, c] + share * (values[following, c] - values[j, c])
     return out
 
 
