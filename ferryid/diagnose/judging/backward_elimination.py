@@ -13,8 +13,8 @@ from ferryid.diagnose.judging.axis_consistency import check_axis_consistency
 from ferryid.diagnose.judging.credibility import interval_doubt
 from ferryid.diagnose.judging.held_out import HeldOutEvidence, held_out_evidence
 from ferryid.diagnose.judging.rivals import (
-    Contest,
     RivalComparison,
+    compare_rivals,
     redundant_shape,
     with_both,
     without_companions,
@@ -75,10 +75,12 @@ def eliminate_backward(
     tried = {found.keys}
     kept, swaps = found, 0
     while kept.candidates:
-        progress("weighing rivals")
-        contests = [Contest(problem, kept, i, library) for i in range(len(kept.candidates))]
-        likelier = [one.likelier() for one in contests] if swaps < JUDGING.most_replacements else []
-        better = [(i, one) for i, one in enumerate(likelier) if one is not None and one.fit.keys not in tried]
+        standings: tuple[RivalComparison, ...] = ()
+        if swaps < JUDGING.most_replacements:
+            progress("weighing rivals")
+            standings = _standings(problem, kept, library)
+        better = [(i, one) for i, standing in enumerate(standings) for one in standing.rivals[:1] if one.gain > 0.0]
+        better = [(i, one) for i, one in better if one.fit.keys not in tried]
         if better:
             # What was selected first may be less likely beside what was selected later than another in its place.
             replaced, best = max(better, key=lambda pair: pair[1].gain)
@@ -91,14 +93,20 @@ def eliminate_backward(
         proof = held_out_evidence(problem, kept)
         fallen, why = _fallen(problem, kept, proof)
         if fallen is None:
+            # Where none takes a place any more, rivals are asked for once all stand.
+            standings = standings or _standings(problem, kept, library)
             # What fell may have been right: it is no rival of what is likely beside it.
-            standings = tuple(without_companions(problem, kept, i, one.comparison()) for i, one in enumerate(contests))
+            standings = tuple(without_companions(problem, kept, i, one) for i, one in enumerate(standings))
             return Elimination(kept, proof, standings, _told(fallen_by_reason))
         if why:
             fallen_by_reason.setdefault(why, []).append(kept.candidates[fallen].title)
         kept = prune(problem, without(problem, kept, fallen))
         tried.add(kept.keys)
     return Elimination(kept, None, (), _told(fallen_by_reason))
+
+
+def _standings(problem: EstimationProblem, kept: Fit, library: Sequence[Candidate]) -> tuple[RivalComparison, ...]:
+    return tuple(compare_rivals(problem, kept, i, library) for i in range(len(kept.candidates)))
 
 
 def _told(fallen_by_reason: Mapping[str, Sequence[str]]) -> tuple[str, ...]:

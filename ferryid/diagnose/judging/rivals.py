@@ -7,13 +7,11 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 from math import exp, inf
 
-from ferryid.cached import cached_property
 from ferryid.diagnose.inference.common_cause import with_fewer_coefficients
 from ferryid.diagnose.inference.estimation import (
     Candidate,
     EstimationProblem,
     Fit,
-    StartingPoint,
     choose_parameters,
     fit,
     starting_point,
@@ -149,104 +147,55 @@ def redundant_shape(
     return None
 
 
-class Contest:
-    """A candidate's place in a fit, and every other candidate of a library that may stand there, in its span.
+def compare_rivals(problem: EstimationProblem, kept: Fit, index: int, library: Sequence[Candidate]) -> RivalComparison:
+    """Return how a candidate stands against every other of the library in its place, in its span.
 
-    A candidate that is too brief to be judged is weighed against none at all only: it is no name, whatever else could stand
-    there.
+    One that is too brief to be judged is weighed against none at all only: it is no name, whatever else could stand there.
     """
+    candidate = kept.candidates[index]
+    bare = without(problem, kept, index)
+    none = exp(min(bare.evidence - kept.evidence + INFERENCE.prior_odds, 50.0))
+    if is_brief(problem, candidate):
+        return RivalComparison((), 1.0 / (1.0 + none), kept.evidence - bare.evidence)
+    begin = starting_point(problem, bare)
+    beside = linearise(problem, bare, begin)
+    taken = {one.key for one in kept.candidates}
 
-    def __init__(self, problem: EstimationProblem, kept: Fit, index: int, library: Sequence[Candidate]) -> None:
-        self._problem, self._kept, self._index, self._library = problem, kept, index, library
-        self._candidate = kept.candidates[index]
-        self._fits: dict[tuple[str, str | None], RivalFit] = {}
-
-    @cached_property
-    def _bare(self) -> Fit:
-        return without(self._problem, self._kept, self._index)
-
-    @cached_property
-    def _begin(self) -> StartingPoint:
-        return starting_point(self._problem, self._bare)
-
-    @cached_property
-    def _beside(self) -> Linearisation:
-        return linearise(self._problem, self._bare, self._begin)
-
-    @cached_property
-    def _others(self) -> list[Candidate]:
-        if is_brief(self._problem, self._candidate):
-            return []
-        taken = {one.key for one in self._kept.candidates}
-        others = [other for other in self._library if other.key not in taken]
-        return [one for one in others if _may_stand_in(self._problem, self._beside, self._candidate, one)]
-
-    def likelier(self) -> RivalFit | None:
-        """Return the best that is likelier than the candidate, None where none is: how far behind others are is not asked."""
-        # One that is near in evidence when it is ranked may still pass the candidate.
-        least = self._kept.evidence - JUDGING.unresolved_evidence
-        near = [one for one in self._best_first(least)[: JUDGING.fitted_rivals] if self._is_fitted(one, least)]
-        best = max(over(self._settled, near), key=lambda one: one.gain, default=None)
-        return None if best is None or best.gain <= 0.0 else best
-
-    def comparison(self) -> RivalComparison:
-        """Return how the candidate stands against all of them."""
-        kept, bare = self._kept, self._bare
-        none = exp(min(bare.evidence - kept.evidence + INFERENCE.prior_odds, 50.0))
-        # One that is worse than nothing is no rival, whatever it comes to.
-        rivals = self._best_first(bare.evidence)
-        # How far behind the others are does not matter to the digit.
-        rivals[: JUDGING.fitted_rivals] = over(self._settled, rivals[: JUDGING.fitted_rivals])
-        rivals.sort(key=lambda one: -one.gain)
-        against = none + sum(exp(min(one.gain, 50.0)) for one in rivals)
-        return RivalComparison(tuple(rivals), 1.0 / (1.0 + against), kept.evidence - bare.evidence)
-
-    def _best_first(self, least: float) -> list[RivalFit]:
-        """Return every other in the candidate's place; of one that seems to stay below some evidence only that it does."""
-        made = over(
-            lambda other: self._instead(other, least), [one for one in self._others if one.key not in self._fits]
-        )
-        by_key = self._fits | {one.candidate.key: one for one in made}
-        self._fits |= {key: one for key, one in by_key.items() if self._is_fitted(one, least)}
-        return sorted((by_key[one.key] for one in self._others), key=lambda one: -one.gain)
-
-    def _is_fitted(self, one: RivalFit, least: float) -> bool:
-        """Tell whether a fit of which no more was asked than whether it comes to some evidence was not given up."""
-        return one.fit.evidence >= least or self._least(one.candidate, least) < least
-
-    def _least(self, other: Candidate, least: float) -> float:
-        """Return the evidence below which a fit of another in the candidate's place may be given up."""
-        if other.effect.changes_hull or other.effect.piecewise:
-            # The slope where the fit begins says little of what it comes to.
-            return -inf
-        # What is alike comes near, however little its slope promises; but worse than nothing it is no rival.
-        return min(least, self._bare.evidence) if alike(other, self._candidate, 1.0) else least
-
-    def _instead(self, other: Candidate, least: float) -> RivalFit:
-        problem, bare, candidate = self._problem, self._bare, self._candidate
+    def instead(other: Candidate) -> RivalFit:
         refit_spans = (
             replace(other, onset_s=candidate.onset_s, offset_s=candidate.offset_s) if other.effect.onset else other
         )
         stand_in = choose_parameters(problem, bare, refit_spans)
+        start = [*bare.values, likeliest_start(problem, beside, stand_in)]
         made = fit(
             problem,
             [*bare.candidates, stand_in],
-            [*bare.values, likeliest_start(problem, self._beside, stand_in)],
+            start,
             steps=COARSE_ITERATIONS,
-            begin=None if stand_in.effect.changes_hull else self._begin,
-            least=self._least(stand_in, least),
+            begin=None if stand_in.effect.changes_hull else begin,
+            # One that is worse than nothing is no rival, whatever it comes to.
+            least=-inf if stand_in.effect.changes_hull or stand_in.effect.piecewise else bare.evidence,
         )
-        return RivalFit(stand_in, made, made.evidence - self._kept.evidence)
+        return RivalFit(stand_in, made, made.evidence - kept.evidence)
 
-    def _settled(self, one: RivalFit) -> RivalFit:
-        problem, kept = self._problem, self._kept
+    def settled_in(one: RivalFit) -> RivalFit:
         made = fit(problem, one.fit.candidates, one.fit.values, begin=starting_point(problem, one.fit))
         ours = kept.evidence
-        if one.candidate.effect.of_coefficients and self._candidate.effect.changes_hull and made.evidence > ours:
+        if one.candidate.effect.of_coefficients and candidate.effect.changes_hull and made.evidence > ours:
             # With some of these coefficients beside it, the cause of the others may be likelier.
             pair = with_fewer_coefficients(problem, kept, one.candidate)
             ours = ours if pair is None else max(ours, pair.evidence)
         return RivalFit(one.candidate, made, made.evidence - ours)
+
+    others = [other for other in library if other.key not in taken]
+    others = [one for one in others if _may_stand_in(problem, beside, candidate, one)]
+    rivals = over(instead, others)
+    rivals.sort(key=lambda one: -one.gain)
+    # How far behind the others are does not matter to the digit.
+    rivals[: JUDGING.fitted_rivals] = over(settled_in, rivals[: JUDGING.fitted_rivals])
+    rivals.sort(key=lambda one: -one.gain)
+    against = none + sum(exp(min(one.gain, 50.0)) for one in rivals)
+    return RivalComparison(tuple(rivals), 1.0 / (1.0 + against), kept.evidence - bare.evidence)
 
 
 def with_both(problem: EstimationProblem, kept: Fit, index: int, rival: Fit) -> Fit:

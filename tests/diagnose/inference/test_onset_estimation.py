@@ -27,7 +27,7 @@ from ferryid.diagnose.inference.onset_estimation import (
 from ferryid.diagnose.inference.search import ScoredCandidate, _in_the_same_span, list_candidates, search
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import windows
-from ferryid.diagnose.judging.rivals import Contest
+from ferryid.diagnose.judging.rivals import compare_rivals
 from tests.diagnose.inference.test_estimation import PUSH, problem
 from tests.diagnose.trials import sailed, trial_on
 
@@ -111,7 +111,7 @@ def test_what_lasts_less_than_two_blocks_is_brief() -> None:
     assert not is_brief(case, PUSH)
     # It has no rivals: no name could be judged there.
     made = fit(case, [replace(PUSH, onset_s=100.0, offset_s=130.0)])
-    assert Contest(case, made, 0, [PUSH]).comparison().rivals == ()
+    assert compare_rivals(case, made, 0, [PUSH]).rivals == ()
 
 
 @pytest.mark.slow

@@ -17,7 +17,7 @@ from ferryid.diagnose.judging.backward_elimination import (
     _told,
     eliminate_backward,
 )
-from ferryid.diagnose.judging.rivals import Contest, RivalComparison, RivalFit, with_both, without_companions
+from ferryid.diagnose.judging.rivals import RivalComparison, RivalFit, with_both, without_companions
 from tests.diagnose.trials import sailed, trial_on
 
 pytestmark = pytest.mark.slow
@@ -69,25 +69,6 @@ def test_what_a_rival_replaces_stays_beside_it_where_both_act(problem: Estimatio
     assert with_both(problem, loss, 0, first).keys == {LOSS, FIRST}
     both, wrong = fit(problem, of(problem, LOSS, FIRST)), fit(problem, of(problem, SECOND))
     assert with_both(problem, wrong, 0, both) is both
-
-
-def test_the_likelier_rival_is_the_best_of_the_comparison(problem: EstimationProblem) -> None:
-    library = candidates(problem)
-    for keys, likelier in (((LOSS, SECOND), True), ((LOSS, FIRST), False)):
-        kept = fit(problem, of(problem, *keys))
-        for index in range(2):
-            first, whole = (Contest(problem, kept, index, library) for _ in range(2))
-            found, standing = first.likelier(), whole.comparison()
-            best = standing.rivals[0]
-            assert (found is not None) == (best.gain > 0.0)
-            if found is not None:
-                assert found.candidate.key == best.candidate.key
-                assert found.gain == best.gain
-            # What was fitted to find it changes nothing of the comparison.
-            assert [(one.candidate.key, one.gain) for one in first.comparison().rivals] == [
-                (one.candidate.key, one.gain) for one in standing.rivals
-            ]
-        assert likelier == any(Contest(problem, kept, index, library).likelier() is not None for index in range(2))
 
 
 def test_what_was_fitted_without_a_candidate_is_kept(problem: EstimationProblem) -> None:
