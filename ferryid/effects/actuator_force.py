@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ferryid.effects.force_model import ForceModel, Measurements
+from ferryid.compiled import compiled
+from ferryid.effects.force_model import ForceModel, Measurements, check_actuators
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import AXES, Flags, Floats
 from ferryid.vessel.profile import Actuator, Profile
@@ -35,14 +36,25 @@ def scaled(force_model: ForceModel, k: int, share: Floats) -> ForceModel:
     Of a propeller with a rudder that is the force ahead: across it is the rudder's, which lives on the vessel's own flow where
     the propeller is weak or turns astern.
     """
-    actuator, parts = force_model.measurements.profile.actuators[k], force_model.parts.copy()
+    actuator = force_model.measurements.profile.actuators[k]
     if actuator.kind == "propeller_rudder":
+        parts = force_model.parts.copy()
         more = (share - 1.0) * parts[:, k, 0]
         parts[:, k, 0] += more
         parts[:, k, 2] -= actuator.position_m[1] * more
-    else:
-        parts[:, k] *= share[:, None]
-    return replace(force_model, parts=parts)
+        return replace(force_model, parts=parts)
+    check_actuators(force_model)
+    parts, share = np.ascontiguousarray(force_model.parts), np.ascontiguousarray(share)
+    return replace(force_model, parts=_with_share(parts, k, share))
+
+
+@compiled
+def _with_share(parts: Floats, k: int, share: Floats) -> Floats:
+    out = parts.copy()
+    for i in range(share.shape[0]):
+        for axis in range(3):
+            out[i, k, axis] *= share[i]
+    return out
 
 
 def lost(before: ForceModel, after: ForceModel, axis: str) -> Floats:

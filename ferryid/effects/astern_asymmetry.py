@@ -9,7 +9,7 @@ import numpy as np
 
 from ferryid.effects.actuator_force import acts_in, along, force_is_measured, index_of, loss_label, lost, scaled
 from ferryid.effects.effect import Effect, Parameter, Values
-from ferryid.effects.force_model import ForceModel, Measurements
+from ferryid.effects.force_model import ForceModel, Measurements, touches
 from ferryid.effects.simulated import Simulated, entry
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
@@ -26,6 +26,7 @@ def instances(profile: Profile) -> tuple[str | None, ...]:
     return tuple(one.name for one in profile.actuators if not force_is_measured(profile, one))
 
 
+@touches("parts", "angles")
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Multiply the force of the actuator where it acts astern."""
     k = index_of(force_model, instance)

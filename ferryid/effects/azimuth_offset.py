@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values
-from ferryid.effects.force_model import ForceModel
+from ferryid.effects.force_model import ForceModel, touches
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
@@ -25,6 +25,7 @@ def instances(profile: Profile) -> tuple[str | None, ...]:
     return tuple(actuator.name for actuator in profile.actuators if actuator.kind == "azimuth")
 
 
+@touches("parts", "angles")
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Turn the force of the thruster."""
     k = force_model.measurements.names.index(str(instance))

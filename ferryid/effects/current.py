@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Turbulence, Values, span
-from ferryid.effects.force_model import ForceModel, Measurements
+from ferryid.effects.force_model import ForceModel, Measurements, touches
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.effects.wording import bearing
 from ferryid.types import Floats
@@ -21,6 +21,7 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     return (Parameter("north", "m/s", 0.2, -3.0, 3.0), Parameter("east", "m/s", 0.2, -3.0, 3.0))
 
 
+@touches("flow")
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Let the water move."""
     flow = np.broadcast_to(p, (len(force_model.measurements.t), 2))

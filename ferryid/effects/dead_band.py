@@ -25,7 +25,7 @@ from ferryid.effects.actuator_force import (
     speed_limits,
 )
 from ferryid.effects.effect import Effect, Parameter, Values
-from ferryid.effects.force_model import ForceModel, Measurements
+from ferryid.effects.force_model import ForceModel, Measurements, touches
 from ferryid.effects.simulated import Simulated, entry
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
@@ -79,6 +79,7 @@ def _able(actuator: Actuator, unit: str) -> bool:
     )
 
 
+@touches("parts", "angles")
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Take the force off within the band."""
     k = index_of(force_model, instance)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import inf, isfinite
+from types import FunctionType
 from typing import Any
 
-from ferryid.effects.force_model import ForceModel, Measurements, between
+from ferryid.effects.force_model import Action, ForceModel, Measurements, between
 from ferryid.effects.simulated import Simulated
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
@@ -238,7 +239,7 @@ class Effect:
     id: str
     title: str
     parameters_of: Callable[[Profile], tuple[Parameter, ...]]
-    apply: Callable[[ForceModel, Floats, str | None], ForceModel]
+    apply: Action
     says: Callable[[Values, str | None], str]
     scenario: Callable[[Values, str | None], dict[str, Any]]
     instances: Callable[[Profile], tuple[str | None, ...]] = lambda profile: (None,)
@@ -246,7 +247,7 @@ class Effect:
     cannot_be_of: Callable[[Measurements, str | None], str] = lambda measurements, instance: ""
     onset: bool = False
     longest_s: float = inf
-    otherwise: Callable[[ForceModel, Floats, str | None], ForceModel] | None = None
+    otherwise: Action | None = None
     step: Effect | None = None
     by_level: Effect | None = None
     impulse: Callable[[ForceModel, Floats], Floats] | None = None
@@ -323,6 +324,17 @@ class Effect:
     def order(self) -> int:
         """When it acts among others: what corrects the measurements first, then what the others build on."""
         return 0 if self.of_sensor else 1 if self.unsteady is not None else 3 if self.acts_last else 2
+
+    @property
+    def touched(self) -> frozenset[str] | None:
+        """Attributes of a force model that it reads or changes; None where that is not known."""
+        actions = [self.apply] if self.otherwise is None else [self.apply, self.otherwise]
+        told: list[frozenset[str] | None] = [
+            vars(one).get("touches") for one in actions if isinstance(one, FunctionType)
+        ]
+        if len(told) < len(actions) or None in told:
+            return None
+        return frozenset().union(*(one for one in told if one), () if self.impulse is None else ("external",))
 
     def act(
         self, force_model: ForceModel, p: Floats, instance: str | None, onset_s: float = 0.0, offset_s: float = inf

@@ -18,7 +18,7 @@ from math import atan2, cos, degrees, hypot, sin, sqrt
 import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values
-from ferryid.effects.force_model import ForceModel
+from ferryid.effects.force_model import ForceModel, touches
 from ferryid.effects.simulated import Simulated, entry
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.effects.wording import bearing
@@ -45,6 +45,7 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     )
 
 
+@touches("external")
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Add the push."""
     psi = force_model.measurements.psi

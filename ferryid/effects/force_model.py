@@ -196,6 +196,24 @@ class ForceModel:
         return replace(self, damping_factor=factor if self.damping_factor is None else self.damping_factor * factor)
 
 
+Action = Callable[[ForceModel, Floats, str | None], ForceModel]
+"""What an effect does to a force model, with parameters and instance."""
+
+
+def touches(*names: str) -> Callable[[Action], Action]:
+    """Tell of what an effect does which attributes of a force model it reads or changes, beside the measurements that it reads.
+
+    A fit that moves the parameters of another effect then need not have it done again where none of these has moved. It is told
+    with the function, so that an effect in which another stands in its place does not say what is no longer so.
+    """
+
+    def told(action: Action) -> Action:
+        vars(action)["touches"] = frozenset({"measurements", *names})
+        return action
+
+    return told
+
+
 def hull_of(profile: Profile) -> Floats:
     """Return the coefficients of a profile's hull in the order of `COEFFICIENTS`, zero where unknown."""
     M, D = profile.hull.M, profile.hull.D

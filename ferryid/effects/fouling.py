@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values
-from ferryid.effects.force_model import COEFFICIENTS, ForceModel, Measurements
+from ferryid.effects.force_model import COEFFICIENTS, ForceModel, Measurements, touches
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.effects.wording import listed
 from ferryid.types import AXES, Floats
@@ -27,6 +27,7 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     return tuple(Parameter(axis, "-", 1.0, 0.3, 6.0, neutral=1.0) for axis in AXES)
 
 
+@touches("hull")
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Multiply the coefficients."""
     hull = force_model.hull.copy()

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects.effect import HELD, Choice, Effect, Parameter, Residual, Values
-from ferryid.effects.force_model import COEFFICIENTS, MASS, ForceModel, Measurements, hull_of
+from ferryid.effects.force_model import COEFFICIENTS, MASS, ForceModel, Measurements, hull_of, touches
 from ferryid.effects.hull_spread import hull_model_spread
 from ferryid.effects.linear_evidence import hull_jacobian
 from ferryid.effects.thresholds import EFFECTS
@@ -92,6 +92,7 @@ def _best_subset(G: Floats, b: Floats, names: list[str], usual: float) -> tuple[
     return best, log_alternatives(best)
 
 
+@touches("hull")
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Multiply the coefficients."""
     factor = np.ones(len(COEFFICIENTS))

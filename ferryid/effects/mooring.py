@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values, span
-from ferryid.effects.force_model import ForceModel, Measurements
+from ferryid.effects.force_model import ForceModel, Measurements, touches
 from ferryid.effects.simulated import Simulated
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
@@ -29,6 +29,7 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     )
 
 
+@touches("external")
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Add the spring's pull on the body origin."""
     measurements = force_model.measurements

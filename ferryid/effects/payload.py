@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values, span
-from ferryid.effects.force_model import ForceModel, Measurements, aboard, added_mass
+from ferryid.effects.force_model import ForceModel, Measurements, aboard, added_mass, touches
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
 from ferryid.vessel.dimensions import off_hull
@@ -43,6 +43,7 @@ def _by_mass(profile: Profile) -> float:
     return 1.0 / (WATER * WATERPLANE * hull.length_m * hull.beam_m * hull.draught_m)
 
 
+@touches("hull", "load", "damping_factor")
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Put the mass aboard."""
     n = len(force_model.measurements.t)

@@ -13,7 +13,7 @@ import numpy as np
 
 from ferryid.compiled import borrowing, compiled
 from ferryid.effects.effect import Choice, Effect, Parameter, Residual, Values
-from ferryid.effects.force_model import ForceModel, Measurements, added_mass
+from ferryid.effects.force_model import ForceModel, Measurements, added_mass, touches
 from ferryid.effects.hull_spread import hull_model_spread
 from ferryid.effects.linear_evidence import hull_jacobian, log_evidence_gains
 from ferryid.effects.thresholds import EFFECTS
@@ -64,6 +64,7 @@ def inside(measurements: Measurements, sides: Floats) -> Floats:
     return _inside(np.ascontiguousarray(measurements.eta), *sides.tolist())
 
 
+@touches("hull", "load", "damping_factor")
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Multiply the damping in the place, and let the added mass grow."""
     growth = (float(p[0]) - 1.0) * inside(force_model.measurements, p[1:5])

@@ -11,7 +11,7 @@ import numpy as np
 from ferryid.compiled import compiled
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.equations_of_motion import relative
-from ferryid.effects.force_model import ForceModel, Measurements, check_actuators, flow_along_vessel
+from ferryid.effects.force_model import ForceModel, Measurements, check_actuators, flow_along_vessel, touches
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
@@ -22,6 +22,7 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     return (Parameter("per_mps", "s/m", 0.2, -0.2, 2.0),)
 
 
+@touches("parts", "flow")
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Take ``k V_a`` off each force, V_a the velocity of the thruster through the water along its own push."""
     measurements = force_model.measurements

@@ -19,7 +19,7 @@ from ferryid.effects.actuator_force import (
     scaled,
 )
 from ferryid.effects.effect import Effect, Parameter, Values
-from ferryid.effects.force_model import ForceModel, Measurements
+from ferryid.effects.force_model import ForceModel, Measurements, touches
 from ferryid.effects.simulated import Simulated, entry
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
@@ -65,6 +65,7 @@ def instances(profile: Profile) -> tuple[str | None, ...]:
     )
 
 
+@touches("parts", "angles")
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Bend the force of the actuator into its limits."""
     k = index_of(force_model, instance)

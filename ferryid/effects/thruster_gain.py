@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values, span
-from ferryid.effects.force_model import ForceModel
+from ferryid.effects.force_model import ForceModel, touches
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import AXES, Floats
 from ferryid.vessel.hull import current_in_body
@@ -36,11 +36,13 @@ def parameters_of_step(profile: Profile) -> tuple[Parameter, ...]:
     return factor, replace(factor, name="otherwise")
 
 
+@touches("parts")
 def apply_step(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Multiply the thrust of the thruster by both."""
     return apply(force_model, p[:1] * p[1:], instance)
 
 
+@touches("parts")
 def otherwise(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Multiply the thrust of the thruster as at other times."""
     return apply(force_model, p[1:], instance)
@@ -51,6 +53,7 @@ def parameters_by_level(profile: Profile) -> tuple[Parameter, ...]:
     return *parameters_of(profile), Parameter("power", "-", 0.3, -1.0, 1.0)
 
 
+@touches("parts")
 def apply_by_level(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Multiply the thrust of the thruster by a power of it: a curve that rises faster or more slowly than the profile's."""
     measurements = force_model.measurements
@@ -71,6 +74,7 @@ def instances(profile: Profile) -> tuple[str | None, ...]:
     return tuple(actuator.name for actuator in profile.actuators)
 
 
+@touches("parts")
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Multiply the thrust of the thruster."""
     return _multiplied(force_model, p[0], force_model.measurements.names.index(str(instance)))

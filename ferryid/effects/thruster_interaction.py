@@ -11,7 +11,7 @@ import numpy as np
 from ferryid.compiled import compiled
 from ferryid.effects.actuator_force import along
 from ferryid.effects.effect import Effect, Parameter, Values
-from ferryid.effects.force_model import ForceModel, Measurements, check_actuators
+from ferryid.effects.force_model import ForceModel, Measurements, check_actuators, touches
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
@@ -26,6 +26,7 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     return (Parameter("fraction", "-", 0.2, 0.0, 1.0),)
 
 
+@touches("parts", "angles")
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Take the loss off, which grows with the root of the force behind the wake as a jet's speed does."""
     actuators = force_model.measurements.profile.actuators

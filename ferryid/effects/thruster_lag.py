@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values
-from ferryid.effects.force_model import ForceModel
+from ferryid.effects.force_model import ForceModel, touches
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.recursive_filter import recursive_filter
 from ferryid.types import AXES, Floats
@@ -22,6 +22,7 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     return (Parameter("time_constant", "s", 0.5, 0.0, 10.0),)
 
 
+@touches("parts", "angles")
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Let the strength of each thruster lag; its direction is as measured."""
     if p[0] < 1e-3:

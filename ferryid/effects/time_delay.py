@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.compiled import compiled
 from ferryid.effects.effect import Effect, Parameter, Values
-from ferryid.effects.force_model import ForceModel
+from ferryid.effects.force_model import ForceModel, touches
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
@@ -19,16 +20,30 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     return (Parameter("seconds", "s", 0.3, -3.0, 3.0),)
 
 
+@touches("parts")
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Look the actuators' forces up at the time that the motion was measured at."""
     if p[0] == 0.0:
         return force_model
     t = force_model.measurements.t
-    shape = force_model.parts.shape
-    flat = force_model.parts.reshape(len(t), -1)
-    when = t - p[0]
-    parts = np.column_stack([np.interp(when, t, column) for column in flat.T]).reshape(shape)
-    return replace(force_model, parts=parts)
+    flat = np.ascontiguousarray(force_model.parts).reshape(len(t), -1)
+    return replace(force_model, parts=_looked_up(flat, t, t - p[0]).reshape(force_model.parts.shape))
+
+
+@compiled
+def _looked_up(values: Floats, t: Floats, when: Floats) -> Floats:
+    """Return values, shape (n, c), at increasing times, linear between those of their rows and held at the ends."""
+    out = np.empty((when.shape[0], values.shape[1]))
+    last, j = t.shape[0] - 1, 0
+    for i in range(when.shape[0]):
+        while j < last and t[j + 1] <= when[i]:
+            j += 1
+        following, share = j, 0.0
+        if j < last and when[i] > t[0]:
+            following, share = j + 1, (when[i] - t[j]) / (t[j + 1] - t[j])
+        for c in range(values.shape[1]):
+            out[i, c] = values[j, c] + share * (values[following, c] - values[j, c])
+    return out
 
 
 def says(values: Values, instance: str | None) -> str:

@@ -27,7 +27,7 @@ from ferryid.effects.actuator_force import (
     scaled,
 )
 from ferryid.effects.effect import Effect, Parameter, Values
-from ferryid.effects.force_model import ForceModel, Measurements
+from ferryid.effects.force_model import ForceModel, Measurements, touches
 from ferryid.effects.simulated import Simulated, entry
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
@@ -69,6 +69,7 @@ def left(loads: Floats, p: Floats) -> Floats:
     return np.asarray(1.0 - (1.0 - p[0]) * air * air * (3.0 - 2.0 * air))
 
 
+@touches("parts", "angles")
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Take the loss off the force of the actuator."""
     k = index_of(force_model, instance)

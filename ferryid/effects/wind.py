@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects.effect import Choice, Effect, Parameter, Residual, Turbulence, Values, span
-from ferryid.effects.force_model import ForceModel, Measurements, wind_load, wind_load_by_row
+from ferryid.effects.force_model import ForceModel, Measurements, touches, wind_load, wind_load_by_row
 from ferryid.effects.hull_spread import hull_model_spread
 from ferryid.effects.linear_evidence import hull_jacobian, profiled_loss
 from ferryid.effects.thresholds import EFFECTS
@@ -64,6 +64,7 @@ def choose(force_model: ForceModel, prior_hull: Floats, residual: Residual) -> C
     return Choice((*begun, *parameters[2:]), 0.0)
 
 
+@touches("external", "air", "air_factors", "gust_std")
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Add the wind's load, less that of still air, which is there already; every row may have a wind of its own."""
     measurements = force_model.measurements

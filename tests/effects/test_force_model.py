@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -249,6 +249,43 @@ def test_what_acts_last_does_the_same_first(last: Effect) -> None:
         np.testing.assert_allclose(as_measured(after), as_measured(before), rtol=1e-9, atol=1e-9, err_msg=other.id)
         tried += 1
     assert tried > 5
+
+
+@pytest.mark.parametrize("effect", [one for one in effects().values() if one.touched], ids=lambda one: one.id)
+def test_what_an_effect_does_depends_on_what_it_touches_alone(effect: Effect) -> None:
+    """Where that is as it was, a fit takes what it did from there; all else passes through as it is."""
+    one, another = force_model(flow=True, load=True, damped=True), force_model(flow=True, load=True, damped=True)
+    touched = effect.touched or frozenset()
+    other = replace(
+        another,
+        hull=1.1 * another.hull,
+        parts=0.9 * another.parts,
+        angles=another.angles + 0.1,
+        air=np.ones(2),
+        air_factors=np.full(3, 1.1),
+        gust_std=0.7,
+        turned=0.1,
+        antenna=(0.2, 0.1),
+    )
+    other = replace(other, **{name: getattr(one, name) for name in touched})
+    candidate = Candidate(effect, effect.instances(FERRY)[0], effect.parameters_of(FERRY))
+    values = np.array([each.neutral + 0.3 * each.size for each in candidate.parameters])
+    for span in ({}, {"onset_s": float(one.measurements.t[5]), "offset_s": float(one.measurements.t[15])}):
+        spanned = replace(candidate, **span)
+        acted = spanned.act(other, values)
+        again = spanned.act_again(other, values, one, spanned.act(one, values))
+        for each in fields(acted):
+            found = getattr(acted, each.name)
+            if each.name not in touched:
+                assert found is getattr(other, each.name), each.name
+            elif each.name != "measurements":
+                np.testing.assert_array_equal(found, getattr(again, each.name), err_msg=each.name)
+
+
+def test_what_stands_in_the_place_of_an_effect_does_not_say_what_it_touches() -> None:
+    gain = effects()["thruster_gain"]
+    assert gain.touched == {"measurements", "parts"}
+    assert replace(gain, apply=lambda force_model, p, instance: force_model).touched is None
 
 
 def test_what_acts_last_has_its_turn_last_and_large_ones_at_the_very_end() -> None:

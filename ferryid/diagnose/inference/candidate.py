@@ -8,6 +8,7 @@ from math import inf, isfinite
 
 import numpy as np
 
+from ferryid.cached import cached_property
 from ferryid.effects.effect import Effect, Parameter
 from ferryid.effects.force_model import ForceModel, Measurements
 from ferryid.effects.wording import titled
@@ -126,6 +127,21 @@ class Candidate:
         if self.heading is not None:
             return self.heading.acted(lambda other: replace(self, heading=None).act(other, p), force_model)
         return self.effect.act(force_model, p, self.instance, self.onset_s, self.offset_s)
+
+    def act_again(self, force_model: ForceModel, p: Floats, before: ForceModel, after: ForceModel) -> ForceModel:
+        """Return `act`, of an effect that led with the same parameters from another force model to a third.
+
+        What it reads and changes, where the first two have it in common, is that of the third.
+        """
+        touched = self.touched
+        if touched is None or any(getattr(force_model, name) is not getattr(before, name) for name in touched):
+            return self.act(force_model, p)
+        return replace(force_model, **{name: getattr(after, name) for name in touched})
+
+    @cached_property
+    def touched(self) -> frozenset[str] | None:
+        """`Effect.touched`."""
+        return self.effect.touched
 
 
 def apply_candidates(force_model: ForceModel, candidates: Sequence[Candidate], values: Sequence[Floats]) -> ForceModel:

@@ -14,6 +14,7 @@ from ferryid.diagnose.inference.autoregression import AutoregressiveNoise, fit_a
 from ferryid.diagnose.inference.candidate import Candidate as Candidate
 from ferryid.diagnose.inference.candidate import acting_order
 from ferryid.diagnose.inference.candidate import apply_candidates as apply_candidates
+from ferryid.diagnose.inference.folds import Folds, folds_of
 from ferryid.diagnose.inference.newton_step import newton_step
 from ferryid.diagnose.inference.noise_estimation import excerpt, fit_noise
 from ferryid.diagnose.inference.noise_model import NoiseModel, WhiteningFilter, make_whitening_filter
@@ -177,8 +178,23 @@ class EstimationProblem:
         return replace(self, noise=fit_autoregression(self.windows.gap(force_model), self.windows.runs), filter=own)
 
     def part(self, windows: Windows) -> EstimationProblem:
-        """Return the trial of some of its windows, with the same noise."""
-        return replace(self, windows=windows)
+        """Return the trial of some of its windows, with the same noise; the same one for the same windows."""
+        # A part holds its windows, so that no others come to have their id.
+        return self._parts.setdefault(id(windows), replace(self, windows=windows))
+
+    @cached_property
+    def folds(self) -> Folds | None:
+        """`ferryid.diagnose.inference.folds.folds_of` the windows."""
+        return folds_of(self.windows)
+
+    @cached_property
+    def _parts(self) -> dict[int, EstimationProblem]:
+        return {}
+
+    @cached_property
+    def bare_fits(self) -> dict[tuple[int, int], tuple[Fit, Fit]]:
+        """What `without` made already: by the id of a fit and the place of a candidate, that fit and the one without it."""
+        return {}
 
 
 @dataclass(frozen=True)
@@ -255,13 +271,22 @@ def fit(
 
     def chain_of(z: Floats) -> list[ForceModel]:
         """Return the force model of the hull alone, and with each further candidate in the order in which they act."""
-        return extended([replace(problem.plain, hull=problem.plain.hull + problem.hull_spread * z[:h])], z)
-
-    def extended(chain: list[ForceModel], z: Floats) -> list[ForceModel]:
-        values = neutral + size * z[h:]
-        for i in order[len(chain) - 1 :]:
+        chain, values = (
+            [replace(problem.plain, hull=problem.plain.hull + problem.hull_spread * z[:h])],
+            neutral + size * z[h:],
+        )
+        for i in order:
             chain.append(candidates[i].act(chain[-1], values[own[i]]))
         return chain
+
+    def moved_from(chain: Sequence[ForceModel], z: Floats, turn: int) -> ForceModel:
+        """Return the force model with parameters elsewhere of the candidate that has a turn: what acts before is as it was."""
+        values = neutral + size * z[h:]
+        made = candidates[order[turn]].act(chain[turn], values[own[order[turn]]])
+        for later in range(turn + 1, len(order)):
+            i = order[later]
+            made = candidates[i].act_again(made, values[own[i]], chain[later], chain[later + 1])
+        return made
 
     def white(chain: Sequence[ForceModel]) -> Floats:
         return problem.white(chain[-1])
@@ -289,20 +314,22 @@ def fit(
     acts = [order.index(i) for i, candidate in enumerate(candidates) for _ in candidate.parameters]
     # The hull's derivatives cost most: they are taken anew only now and then, and before the fit ends.
     moving, by_hull, of_hull = (problem.origin if begin is None else begin).by_free_hull
+    by_effects = np.empty((len(w), 0))
     both, fresh = np.concatenate([moving, h + free]), False
     square, many = np.ix_(both, both), len(moving)
     products = np.empty((len(both), len(both)))
+    # Where the derivatives by hull and by effects were taken: after a step that led nowhere they are the same again.
+    hull_taken, effects_taken = chain, list[ForceModel]()
     for count in range(max(steps, 1)):
-        if count > 0 and (bends or count % HULL_SLOPE_ITERATIONS == 0):
-            by_hull, fresh = problem.slopes_of(chain[-1], moving), True
+        if hull_taken is not chain and (bends or count % HULL_SLOPE_ITERATIONS == 0):
+            by_hull, hull_taken, fresh = problem.slopes_of(chain[-1], moving), chain, True
             of_hull = by_hull.T @ by_hull
-        by_effects = np.empty((len(w), 0))
-        if free.size:
+        if free.size and effects_taken is not chain:
+            effects_taken = chain
             d = np.where(z[h + free] + PARAMETER_DIFFERENCE <= high[free], PARAMETER_DIFFERENCE, -PARAMETER_DIFFERENCE)
             moved = np.repeat(z[None], len(free), axis=0)
             moved[np.arange(len(free)), h + free] += d
-            # What acts before a candidate is as it was.
-            there = [extended(chain[: 1 + acts[k]], one)[-1] for k, one in zip(free.tolist(), moved, strict=True)]
+            there = [moved_from(chain, one, acts[k]) for k, one in zip(free.tolist(), moved, strict=True)]
             gaps = np.stack([problem.steps.gap(one) for one in there], axis=2)
             by_effects = (problem.whitening_filter.white(gaps) - w[:, None]) / d
         across = by_hull.T @ by_effects
@@ -339,7 +366,7 @@ def fit(
         if gained < CONVERGED_GAIN:
             if fresh or steps <= HULL_SLOPE_ITERATIONS:
                 break
-            by_hull, fresh = problem.slopes_of(chain[-1], moving), True
+            by_hull, hull_taken, fresh = problem.slopes_of(chain[-1], moving), chain, True
             of_hull = by_hull.T @ by_hull
     covariance = np.asarray(np.linalg.inv(A)[h:, h:] * np.outer(size, size), dtype=np.float64)
     fitted = neutral + size * z[h:]
@@ -384,7 +411,16 @@ def without(problem: EstimationProblem, made: Fit, index: int) -> Fit:
 
     Of one that trades with the hull, such as a load, the posterior is a bent ridge: there the way from the profile's hull may
     end on a lower top than that from the hull beside which it was found.
+
+    Selection and judging ask for the same ones again: what was fitted once is kept.
     """
+    key = id(made), index % len(made.candidates)
+    if key not in problem.bare_fits:
+        problem.bare_fits[key] = made, _without(problem, made, index)
+    return problem.bare_fits[key][1]
+
+
+def _without(problem: EstimationProblem, made: Fit, index: int) -> Fit:
     candidates, values = rest_of(made, index)
     bare = fit(problem, candidates, values)
     if not any(one.effect.profiled for one in candidates):

@@ -75,11 +75,13 @@ def eliminate_backward(
     tried = {found.keys}
     kept, swaps = found, 0
     while kept.candidates:
-        progress("weighing rivals")
-        standings = tuple(compare_rivals(problem, kept, i, library) for i in range(len(kept.candidates)))
+        standings: tuple[RivalComparison, ...] = ()
+        if swaps < JUDGING.most_replacements:
+            progress("weighing rivals")
+            standings = _standings(problem, kept, library)
         better = [(i, one) for i, standing in enumerate(standings) for one in standing.rivals[:1] if one.gain > 0.0]
         better = [(i, one) for i, one in better if one.fit.keys not in tried]
-        if better and swaps < JUDGING.most_replacements:
+        if better:
             # What was selected first may be less likely beside what was selected later than another in its place.
             replaced, best = max(better, key=lambda pair: pair[1].gain)
             tried.add(best.fit.keys)
@@ -91,6 +93,8 @@ def eliminate_backward(
         proof = held_out_evidence(problem, kept)
         fallen, why = _fallen(problem, kept, proof)
         if fallen is None:
+            # Where none takes a place any more, rivals are asked for once all stand.
+            standings = standings or _standings(problem, kept, library)
             # What fell may have been right: it is no rival of what is likely beside it.
             standings = tuple(without_companions(problem, kept, i, one) for i, one in enumerate(standings))
             return Elimination(kept, proof, standings, _told(fallen_by_reason))
@@ -99,6 +103,10 @@ def eliminate_backward(
         kept = prune(problem, without(problem, kept, fallen))
         tried.add(kept.keys)
     return Elimination(kept, None, (), _told(fallen_by_reason))
+
+
+def _standings(problem: EstimationProblem, kept: Fit, library: Sequence[Candidate]) -> tuple[RivalComparison, ...]:
+    return tuple(compare_rivals(problem, kept, i, library) for i in range(len(kept.candidates)))
 
 
 def _told(fallen_by_reason: Mapping[str, Sequence[str]]) -> tuple[str, ...]:

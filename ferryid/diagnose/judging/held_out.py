@@ -28,17 +28,19 @@ from ferryid.diagnose.inference.estimation import (
     rest_of,
     starting_point,
 )
-from ferryid.diagnose.inference.folds import Folds, by_block, draws, folds_of, subset
+from ferryid.diagnose.inference.folds import Folds, by_block, draws, subset
 from ferryid.diagnose.inference.force_errors import force_errors, mass_of
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.free_runs import FreeRuns, free_runs
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.effect import HELD
-from ferryid.effects.force_model import ForceModel, as_measured
+from ferryid.effects.force_model import Action, ForceModel, as_measured, touches
 from ferryid.side_by_side import over
 from ferryid.types import Floats
 
 HEADING = "heading mirrored"
+ACTING_BY_FORCE = frozenset({"measurements", "parts", "angles", "external", "air", "air_factors", "gust_std"})
+"""What of a force model is touched by an effect that is a force itself: what the hull makes of it plays no part."""
 IMITATION_STEPS, IMITATION_DIFFERENCE = 4, 0.05
 """Steps of the search for parameters with which a placebo is all but the effect, and their finite difference, in sizes."""
 
@@ -142,7 +144,7 @@ def held_out_evidence(problem: EstimationProblem, found: Fit) -> HeldOutEvidence
     found
         The hypothesis, fitted to the whole log.
     """
-    folds = folds_of(problem.windows)
+    folds = problem.folds
     if folds is None:
         return None
     base = held_out(problem, folds, ())
@@ -179,7 +181,7 @@ def held_out(
     own_start = tuple(one.start for one in candidates) if start is None else tuple(start)
 
     def made_of(training: Windows) -> Fit:
-        part = _part(problem, training)
+        part = problem.part(training)
         begin = (
             None
             if beside is None
@@ -380,10 +382,6 @@ def _hull_strains(
     return without.evidence < found.evidence - least and strains[0] > strains[1] + 2.0 * least
 
 
-def _part(problem: EstimationProblem, windows: Windows) -> EstimationProblem:
-    return problem.part(windows)
-
-
 def _gains(problem: EstimationProblem, folds: Folds, before: Floats, after: Floats) -> Floats:
     """Return the gain in log-likelihood of every block, shape (blocks,)."""
     runs, c = problem.windows.runs, before.shape[1]
@@ -400,7 +398,7 @@ def _shifted(candidate: Candidate, share: float) -> Candidate:
         late = np.roll(force, round(share * len(force)), axis=0)
         return replace(force_model, external=force_model.external + late)
 
-    return replace(candidate, effect=replace(candidate.effect, apply=apply), onset_s=0.0, offset_s=inf)
+    return _in_its_place(candidate, apply)
 
 
 def _mirrored(candidate: Candidate) -> Candidate:
@@ -410,10 +408,20 @@ def _mirrored(candidate: Candidate) -> Candidate:
         force = _force_of(candidate, replace(force_model, measurements=replace(measurements, eta=eta)), p)
         return replace(force_model, external=force_model.external + force)
 
+    return _in_its_place(candidate, apply)
+
+
+def _in_its_place(candidate: Candidate, apply: Action) -> Candidate:
+    """Return a candidate that does something else with the same parameters, all along."""
+    if candidate.touched is not None and candidate.touched <= ACTING_BY_FORCE:
+        apply = touches(*candidate.touched, "external")(apply)
     return replace(candidate, effect=replace(candidate.effect, apply=apply), onset_s=0.0, offset_s=inf)
 
 
 def _force_of(candidate: Candidate, force_model: ForceModel, p: Floats) -> Floats:
     """Return what an effect changes, as a force [N, N, N·m], shape (n, 3)."""
-    more = as_measured(candidate.act(force_model, p)) - as_measured(force_model)
-    return np.asarray(more @ mass_of(force_model.hull).T)
+    acted = candidate.act(force_model, p)
+    if candidate.touched is not None and candidate.touched <= ACTING_BY_FORCE:
+        force = acted.external - force_model.external
+        return force if acted.parts is force_model.parts else force + (acted.parts - force_model.parts).sum(axis=1)
+    return np.asarray((as_measured(acted) - as_measured(force_model)) @ mass_of(force_model.hull).T)

@@ -16,7 +16,7 @@ from ferryid.counts import counted, per_cent
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.candidate_terms import FORCE, Term
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fit, fitted_force_model, rest_of
-from ferryid.diagnose.inference.folds import Folds, block_s, folds_of
+from ferryid.diagnose.inference.folds import Folds, block_s
 from ferryid.diagnose.inference.force_errors import force_errors, position_errors
 from ferryid.diagnose.inference.onset_estimation import is_brief
 from ferryid.diagnose.inference.search import refit_with_own_noise
@@ -77,7 +77,7 @@ def find_unexplained(
         What the vessel's other logs say; None where there are none.
     """
     claims = []
-    folds = folds_of(problem.windows)
+    folds = problem.folds
     after, refitted = kept, problem
     if folds is not None and laws is not None and (common := laws.common(problem, kept, folds)) is not None:
         holding = f"that holds in all {counted(laws.able, 'log')} that can show it"
@@ -159,7 +159,7 @@ def find_displaced(problem: EstimationProblem, kept: Fit) -> tuple[int, ...]:
     than the effect, and leaves it nothing to explain, then the effect was named by mistake. A law that says the same as the
     effect in other words is no such law, nor is one that explains more by no more than the effect's formula may be off.
     """
-    folds = folds_of(problem.windows)
+    folds = problem.folds
     if folds is None:
         return ()
     every = [i for i, one in enumerate(kept.candidates) if not is_brief(problem, one)]

@@ -10,7 +10,7 @@ from scipy.linalg import toeplitz
 from scipy.stats import multivariate_normal
 
 from ferryid.diagnose.inference.autoregression import ORDER, AutoregressiveNoise, fit_autoregression
-from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, fit
+from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, fit, starting_point
 from ferryid.diagnose.inference.kalman import DIFFUSE
 from ferryid.diagnose.inference.noise_model import NoiseModel, stride_s
 from ferryid.diagnose.inference.weak_form import steps_of, windows
@@ -125,6 +125,22 @@ def test_a_fit_is_given_up_only_where_it_cannot_reach_what_is_asked() -> None:
         # Where it starts and its slope there.
         assert (len(calls) == 2) == given_up
         np.testing.assert_allclose([made.evidence, made.values[0][0]], [expected.evidence, expected.values[0][0]])
+
+
+def test_slopes_are_taken_once_where_a_fit_begins_at_its_end() -> None:
+    case, calls = problem(60.0), list[float]()
+
+    def counted(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+        calls.append(float(p[0]))
+        return push(force_model, p, instance)
+
+    candidate = replace(PUSH, effect=replace(PUSH.effect, apply=counted))
+    made = fit(case, [candidate])
+    calls.clear()
+    again = fit(case, [candidate], made.values, begin=starting_point(case, made))
+    # Once for the starting point, then where the fit begins and its slope there.
+    assert len(calls) == 3
+    np.testing.assert_allclose([again.evidence, *again.values[0]], [made.evidence, *made.values[0]])
 
 
 @pytest.mark.parametrize("moved", [0, 1])

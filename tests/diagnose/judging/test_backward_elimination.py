@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, fit, starting_point
+from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, fit, starting_point, without
 from ferryid.diagnose.inference.search import list_candidates, search
 from ferryid.diagnose.judging.backward_elimination import (
     BRIEF,
@@ -69,6 +69,13 @@ def test_what_a_rival_replaces_stays_beside_it_where_both_act(problem: Estimatio
     assert with_both(problem, loss, 0, first).keys == {LOSS, FIRST}
     both, wrong = fit(problem, of(problem, LOSS, FIRST)), fit(problem, of(problem, SECOND))
     assert with_both(problem, wrong, 0, both) is both
+
+
+def test_what_was_fitted_without_a_candidate_is_kept(problem: EstimationProblem) -> None:
+    kept = fit(problem, of(problem, LOSS, FIRST))
+    assert without(problem, kept, 0) is without(problem, kept, -2)
+    assert without(problem, kept, 0) is not without(problem, kept, 1)
+    assert without(problem, replace(kept), 0) is not without(problem, kept, 0)
 
 
 def test_a_rival_that_acts_beside_a_finding_is_none_of_its_name(problem: EstimationProblem) -> None:
