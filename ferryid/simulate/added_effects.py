@@ -71,7 +71,9 @@ def unfit(scenario: Scenario, profile: Profile) -> Iterator[tuple[KeyPath, str]]
                 (*place, "thruster"),
                 f'"{one.effect}" acts on the whole vessel, found thruster = "{one.thruster}". Fix: leave "thruster" out',
             )
-        parameters = {parameter.name: parameter for parameter in effect.parameters_of(profile)}
+        lacks = frozenset() if effect.simulated is None else effect.simulated.lacks
+        every = effect.parameters_of(profile)
+        parameters = {parameter.name: parameter for parameter in every if parameter.name not in lacks}
         for name, value in one.values.items():
             if name not in parameters:
                 yield (
