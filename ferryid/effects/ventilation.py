@@ -44,8 +44,6 @@ WIDTH = 10.0
 
 MEMORY = "time_constant"
 """Parameter: with which time constant air gathers in the disc, and leaves it [s]."""
-AT_ONCE_S = 1e-3
-"""Time constant below which it does so within a row of a log."""
 
 
 def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
@@ -85,7 +83,7 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
     """Take the loss off the force of the actuator."""
     k = index_of(force_model, instance)
     air = drawn(loading(force_model, k), p[1])
-    if p[2] > AT_ONCE_S:
+    if p[2] > 0.0:
         air = lagged(air, float(p[2]), force_model.measurements.step_s)
     return scaled(force_model, k, 1.0 - (1.0 - p[0]) * air)
 
