@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import exp
+
 import numpy as np
 
 from ferryid.compiled import compiled
@@ -27,6 +29,22 @@ def recursive_filter(b: Floats, a: Floats, values: Floats, first_output: Floats 
         before_x[:], before_y[:] = columns[0], np.asarray(first_output, dtype=np.float64).reshape(-1)
     made = _filtered(np.asarray(b, dtype=np.float64), np.asarray(a, dtype=np.float64), columns, before_x, before_y)
     return made.reshape(values.shape)
+
+
+def lagged(values: Floats, time_constant_s: float, step_s: float) -> Floats:
+    """Return the answer of a first-order lag to values that are linear between rows: exact, so that no lag is no delay either.
+
+    Parameters
+    ----------
+    values
+        Shape (n, ...); before the first they stood still.
+    time_constant_s, step_s
+        Of the lag, above zero, and between two rows [s].
+    """
+    x = step_s / time_constant_s
+    keep = exp(-x)
+    new, old = 1.0 - (1.0 - keep) / x, (1.0 - keep) / x - keep
+    return recursive_filter(np.array([new, old]), np.array([1.0, -keep]), values, values[0])
 
 
 @compiled

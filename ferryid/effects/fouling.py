@@ -59,7 +59,11 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
 
 
 def doubt_of_ends(ends: Mapping[str, tuple[float, float]]) -> str:
-    """Return that damping changed both ways: a rough hull grows all of it, in surge, which is mostly friction, first."""
+    """Return that damping changed both ways, or may not have in surge: a rough hull grows all of it, there the most.
+
+    Roughness adds to friction, which is most of what damps surge. Sway and yaw are damped by the pressure of the cross-flow,
+    which grows by other causes: a hull that lies deeper, or whose model is off.
+    """
     more = [axis for axis in AXES if ends[axis][0] > 1.0]
     less = [axis for axis in AXES if ends[axis][1] < 1.0]
     # Of surge the likeliest value counts: what rough hulls show most must not point the other way.
@@ -68,9 +72,12 @@ def doubt_of_ends(ends: Mapping[str, tuple[float, float]]) -> str:
         more = ["surge"]
     elif more and not less and ahead < 1.0:
         less = ["surge"]
-    if not more or not less:
-        return ""
-    return f"damping in {listed(more)} has grown and in {listed(less)} fallen, and a rough hull grows all of it"
+    if more and less:
+        return f"damping in {listed(more)} has grown and in {listed(less)} fallen, and a rough hull grows all of it"
+    low, high = ends["surge"]
+    if low <= 1.0 <= high:
+        return "damping in surge, which the friction of a rough hull grows the most, may not have changed"
+    return ""
 
 
 def regressor(force_model: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:

@@ -31,11 +31,14 @@ class Simulated:
         one that is ordered directly]. An effect of one thruster acts on that one, one of the whole vessel on each.
     constants
         ``constants(profile, thruster)`` returns what else `p` ends with, by the vessel and the thruster it is an effect of.
+    lacks
+        Names of parameters that the simulated vessel does not have, and no scenario can give: it is as if they were neutral.
     """
 
     load: Load | None = None
     thrust: Thrust | None = None
     constants: Callable[[Profile, str], tuple[float, ...]] = lambda profile, thruster: ()
+    lacks: frozenset[str] = frozenset()
 
 
 def entry(effect: str, values: Values, instance: str | None) -> dict[str, Any]:

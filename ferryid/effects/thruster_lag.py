@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from math import exp
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ import numpy as np
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import ForceModel, touches
 from ferryid.effects.thresholds import EFFECTS
-from ferryid.recursive_filter import recursive_filter
+from ferryid.recursive_filter import lagged
 from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
 
@@ -27,7 +26,7 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
     """Let the strength of each thruster lag; its direction is as measured."""
     if p[0] < 1e-3:
         return force_model
-    late = partial(_late, time_constant_s=float(p[0]), step_s=force_model.measurements.step_s)
+    late = partial(lagged, time_constant_s=float(p[0]), step_s=force_model.measurements.step_s)
     parts = force_model.parts.copy()
     for k in range(parts.shape[1]):
         angle = force_model.angles[:, k]
@@ -41,14 +40,6 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
         else:
             parts[:, k] = late(parts[:, k])
     return replace(force_model, parts=parts)
-
-
-def _late(values: Floats, time_constant_s: float, step_s: float) -> Floats:
-    """Return the answer to values that are linear between rows, shape (n, ...): exact, so that no lag is no delay either."""
-    x = step_s / time_constant_s
-    keep = exp(-x)
-    new, old = 1.0 - (1.0 - keep) / x, (1.0 - keep) / x - keep
-    return recursive_filter(np.array([new, old]), np.array([1.0, -keep]), values, values[0])
 
 
 def says(values: Values, instance: str | None) -> str:

@@ -7,14 +7,18 @@ the share depends on relative shaft speed and on relative submergence. A log has
 both: the force of the curve over the largest one of the same direction. Air comes and goes in bursts; what is fitted is the
 mean loss while a propeller is loaded, over a band in which the chance of a burst grows.
 
+Air is drawn into a disc turn by turn and washed out again: the loss is behind the loading, for a time that nobody knows
+beforehand. That is what tells it from a limit, which holds the force from one moment to the next: a propeller that has just
+been loaded still gives all of its force, and one that is eased off not yet.
+
 The force falls as the order rises. Where it only stays behind, at a limit, it saturates; where it falls at every order, the
 thruster is weak; where it falls with the speed of the vessel, it loses to its inflow.
 """
 
 from __future__ import annotations
 
-from functools import partial
 from math import inf, isfinite
+from typing import Any
 
 import numpy as np
 
@@ -30,6 +34,7 @@ from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import ForceModel, Measurements, touches
 from ferryid.effects.simulated import Simulated, entry
 from ferryid.effects.thresholds import EFFECTS
+from ferryid.recursive_filter import lagged
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
 
@@ -37,12 +42,17 @@ WIDTH = 10.0
 """Width of the band above the critical loading over which the loss comes in [% of the largest force]."""
 
 
+MEMORY = "time_constant"
+"""Parameter: with which time constant air gathers in the disc, and leaves it [s]."""
+
+
 def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
-    """Return the share of the force that a ventilated propeller keeps, and the loading from which on it draws air."""
+    """Return the share of the force that a ventilated propeller keeps, the loading from which it draws air, and how fast."""
     return (
         # Without a loss the loading has no meaning.
         Parameter("factor", "-", 0.3, 0.0, 1.0, neutral=1.0, start=0.8, attainable=frozenset({0.0})),
         Parameter("from", "%", 15.0, 30.0, 90.0, neutral=60.0),
+        Parameter(MEMORY, "s", 1.0, 0.0, 10.0, start=0.5),
     )
 
 
@@ -63,22 +73,28 @@ def loading(force_model: ForceModel | Measurements, k: int) -> Floats:
     return np.asarray(100.0 * np.where(push >= 0.0, push / ahead, -push / astern))
 
 
-def left(loads: Floats, p: Floats) -> Floats:
-    """Return the share of the force that is left at loadings [%]."""
-    air = np.clip((loads - p[1]) / WIDTH, 0.0, 1.0)
-    return np.asarray(1.0 - (1.0 - p[0]) * air * air * (3.0 - 2.0 * air))
+def drawn(loads: Floats, threshold: float) -> Floats:
+    """Return the share of the most air that a propeller draws in the long run at loadings [%] above a threshold [%]."""
+    air = np.clip((loads - threshold) / WIDTH, 0.0, 1.0)
+    return np.asarray(air * air * (3.0 - 2.0 * air))
 
 
 @touches("parts", "angles")
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Take the loss off the force of the actuator."""
     k = index_of(force_model, instance)
-    return scaled(force_model, k, left(loading(force_model, k), p))
+    air = drawn(loading(force_model, k), p[1])
+    if p[2] > 0.0:
+        air = lagged(air, float(p[2]), force_model.measurements.step_s)
+    return scaled(force_model, k, 1.0 - (1.0 - p[0]) * air)
 
 
 def change(p: Floats, speed: float, force: float) -> float:
-    """Return the force of a thruster [N] for the simulator; `p` ends with its largest forces ahead and astern [N]."""
-    air = min(max((100.0 * abs(force) / (p[2] if force >= 0.0 else p[3]) - p[1]) / WIDTH, 0.0), 1.0)
+    """Return the force of a thruster [N] for the simulator, whose propellers draw air at once.
+
+    `p` ends with its largest forces ahead and astern [N].
+    """
+    air = min(max((100.0 * abs(force) / (p[3] if force >= 0.0 else p[4]) - p[1]) / WIDTH, 0.0), 1.0)
     return float(force * (1.0 - (1.0 - p[0]) * air * air * (3.0 - 2.0 * air)))
 
 
@@ -107,10 +123,21 @@ def cannot_be_of(measurements: Measurements, instance: str | None) -> str:
 
 def says(values: Values, instance: str | None) -> str:
     """Return the finding as a sentence."""
-    return (
+    told = (
         f"Above {values['from']:.0f} % of its largest force {instance} keeps {100.0 * values['factor']:.0f} % of the force of "
-        "its thrust curve, as a propeller that draws air."
+        "its thrust curve, as a propeller that draws air"
     )
+    memory_s = round(values.get(MEMORY, 0.0), 1)
+    return (
+        f"{told}, which gathers, and leaves, with a time constant of {memory_s:.1f} s."
+        if memory_s > 0.0
+        else f"{told}."
+    )
+
+
+def scenario(values: Values, instance: str | None) -> dict[str, Any]:
+    """Return the scenario's effect, which has no memory."""
+    return entry("ventilation", {name: value for name, value in values.items() if name != MEMORY}, instance)
 
 
 def regressor(force_model: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
@@ -125,7 +152,7 @@ EFFECT = Effect(
     parameters_of,
     apply,
     says,
-    partial(entry, "ventilation"),
+    scenario,
     instances=instances,
     cannot=cannot,
     cannot_be_of=cannot_be_of,
@@ -133,6 +160,5 @@ EFFECT = Effect(
     vessel=True,
     regressor=regressor,
     negligible=EFFECTS.least_ventilation,
-    simulated=Simulated(thrust=change, constants=constants),
-    by_row=True,
+    simulated=Simulated(thrust=change, constants=constants, lacks=frozenset({MEMORY})),
 )

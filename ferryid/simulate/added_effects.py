@@ -12,6 +12,7 @@ from ferryid.vessel.faults import TableReader
 from ferryid.vessel.toml_lines import KeyPath
 
 if TYPE_CHECKING:
+    from ferryid.effects.effect import Effect, Parameter
     from ferryid.simulate.scenario import Scenario
     from ferryid.vessel.profile import Profile
 
@@ -32,6 +33,12 @@ def simulated() -> list[str]:
     from ferryid.effects import effects  # here and below: heavier than all else that reads scenarios
 
     return [name for name, effect in effects().items() if effect.simulated is not None]
+
+
+def given(effect: Effect, profile: Profile) -> list[Parameter]:
+    """Return the parameters of an effect that an entry can give: those that the simulated vessel has."""
+    lacks = frozenset() if effect.simulated is None else effect.simulated.lacks
+    return [one for one in effect.parameters_of(profile) if one.name not in lacks]
 
 
 def read_effects(top: TableReader) -> tuple[AddedEffect, ...]:
@@ -71,7 +78,7 @@ def unfit(scenario: Scenario, profile: Profile) -> Iterator[tuple[KeyPath, str]]
                 (*place, "thruster"),
                 f'"{one.effect}" acts on the whole vessel, found thruster = "{one.thruster}". Fix: leave "thruster" out',
             )
-        parameters = {parameter.name: parameter for parameter in effect.parameters_of(profile)}
+        parameters = {parameter.name: parameter for parameter in given(effect, profile)}
         for name, value in one.values.items():
             if name not in parameters:
                 yield (

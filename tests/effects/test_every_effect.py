@@ -54,7 +54,7 @@ MODERATE = {
     "astern_asymmetry": {"factor": 0.8},
     "thrust_saturation": {"ahead": 160.0, "astern": 304.1227},
     "external_push": {"north": 60.0, "east": -50.0, "moment": 60.0},
-    "ventilation": {"factor": 0.6, "from": 40.0},
+    "ventilation": {"factor": 0.6, "from": 40.0, "time_constant": 0.0},
     "shallow_water": {"factor": 1.6, "south": 12.0, "north": 34.0, "west": -18.0, "east": 4.0, "added_mass": 0.0},
 }
 """Where one size of every parameter would be gross, or no place for a ferry."""

@@ -11,7 +11,7 @@ import pytest
 
 from ferryid.effects import effects
 from ferryid.errors import FerryIdError
-from ferryid.simulate.added_effects import simulated
+from ferryid.simulate.added_effects import given, simulated
 from ferryid.simulate.paths import PATHS
 from ferryid.simulate.read_section import FLATTENED
 from ferryid.simulate.scenario import MASS, Environment, Scenario, check_against, parse_scenario
@@ -107,7 +107,7 @@ def test_every_effect_that_can_be_added_stands_there_with_its_parameters() -> No
     assert [name for name in simulated() if f"`{name}`" not in rows["effect"][3]] == []
     units: dict[str, list[str]] = {}
     for effect in simulated():
-        for one in effects()[effect].parameters_of(load_profile("milliampere")):
+        for one in given(effects()[effect], load_profile("milliampere")):
             units.setdefault(one.name, []).append(one.unit.replace("-", ""))
             assert f"`{effect}`" in rows[one.name][4]
     assert set(rows) == {"effect", "thruster", "from_s", "until_s", *units}

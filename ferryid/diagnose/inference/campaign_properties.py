@@ -2,7 +2,8 @@
 
 Every candidate is first weighed by gaps and slopes where a search for it begins (a score test as Rao's, hull and conditions of
 all logs partialled out); the best are then estimated beside everything else, and one after the other is selected as long as the
-evidence speaks for it.
+evidence speaks for it. What the evidence speaks for no longer beside what was selected after it leaves again, and is a rival of
+what took its place.
 
 References
 ----------
@@ -126,6 +127,7 @@ def _beside(hull: HullPrior, candidate: Candidate) -> Candidate:
 
 def select_properties(made: CampaignFit, progress: Callable[[str], None]) -> tuple[CampaignFit, Rivals]:
     """Return the estimate with every property that the evidence speaks for, and what was tried in the place of each."""
+    given = made.campaign.properties
     rivals: dict[tuple[str, str | None], tuple[TriedProperty, ...]] = {}
     while len(made.campaign.properties) < INFERENCE.most_effects:
         taken = {one.key for one in made.campaign.properties}
@@ -151,7 +153,54 @@ def select_properties(made: CampaignFit, progress: Callable[[str], None]) -> tup
         )
         # With what it explains gone, the noise is less; the spreads follow.
         made = _opened(estimate_campaign(best.fit.campaign, begin=best.fit), best.candidate)
+    return _without_displaced(made, rivals, given)
+
+
+def _without_displaced(made: CampaignFit, rivals: Rivals, given: Sequence[Candidate]) -> tuple[CampaignFit, Rivals]:
+    """Return an estimate without what was selected and adds nothing worth a name beside the rest, which has it as a rival.
+
+    As of a single log, what the others explain as well goes, the least first. It was selected for something that another
+    explains now. Where it stands it may do nothing at all, which leads nowhere: so it is tried from its start in the place of
+    each, and takes the place in which it is likelier. What the selection began with is not in question.
+    """
+    while selected := [one for one in made.campaign.properties if one not in given]:
+        fewer = [without_property(made, one) for one in selected]
+        k = max(range(len(fewer)), key=lambda i: fewer[i].evidence)
+        if made.evidence - fewer[k].evidence >= INFERENCE.prior_odds:
+            break
+        gone, made = selected.pop(k), fewer[k]
+        tried = [_in_place_of(made, one, gone) for one in selected]
+        for one in tried:
+            rivals = {**rivals, one.found.key: _with_rival(rivals.get(one.found.key, ()), one.tried)}
+        best = max(tried, key=lambda one: one.tried.odds, default=None)
+        if best is not None and best.tried.odds > 0.0:
+            rivals = {**rivals, gone.key: _with_rival(rivals.get(gone.key, ()), best.displaced)}
+            made = best.fit
     return made, rivals
+
+
+@dataclass(frozen=True)
+class _Instead:
+    """A property in the place of one that was found: what either is over the other, and the estimate with it there."""
+
+    found: Candidate
+    tried: TriedProperty
+    displaced: TriedProperty
+    fit: CampaignFit
+
+
+def _in_place_of(made: CampaignFit, found: Candidate, other: Candidate) -> _Instead:
+    bare = without_property(made, found)
+    ours = ScoredProperty(found, made, made.evidence - bare.evidence)
+    theirs = _estimated(bare, start_of(bare, other))
+    odds, most = theirs.over(ours), max(ours.gain, theirs.gain)
+    shares = [one.gain / most if most > 0.0 else 0.0 for one in (theirs, ours)]
+    return _Instead(found, TriedProperty(other, odds, shares[0]), TriedProperty(found, -odds, shares[1]), theirs.fit)
+
+
+def _with_rival(rivals: Sequence[TriedProperty], one: TriedProperty) -> tuple[TriedProperty, ...]:
+    """Return what was tried in a property's place with one more, in place of what was known of it before."""
+    return (*(other for other in rivals if other.candidate.key != one.candidate.key), one)
 
 
 def _opened(made: CampaignFit, candidate: Candidate) -> CampaignFit:

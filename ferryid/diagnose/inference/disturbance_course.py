@@ -43,11 +43,14 @@ class StrengthCourse:
         From when until when it acts [s].
     growth
         Strength at the end of the log over that at its start.
+    with_force
+        True where its ends are those of a force that was found, and so are no choice.
     """
 
     onset_s: float = 0.0
     offset_s: float = inf
     growth: float = 1.0
+    with_force: bool = False
 
     @property
     def ends(self) -> int:
@@ -65,7 +68,7 @@ class StrengthCourse:
 
     def cost(self, steps: int) -> float:
         """Return the evidence that it must bring: each end is chosen from so many steps, and it is a finding of its own."""
-        if self == ALL_ALONG:
+        if self == ALL_ALONG or self.with_force:
             return 0.0
         return INFERENCE.prior_odds + (self.ends + 0.5 * (self.growth != 1.0)) * log(steps)
 

@@ -104,7 +104,8 @@ def fit_disturbances(
     Each is weighed by its likelihood, at its most likely parameters and noise, less Schwarz's penalty for its parameters and
     what its prior odds are lower where the log was recorded. One in a narrow band is looked for in the velocities as well: a
     gyroscope shows small waves that the error of a compass hides. Only beside a hull that the profile knows: what a guessed one
-    leaves has bursts in narrow bands of its own, and so has the noise of receivers.
+    leaves has bursts in narrow bands of its own, and so has the noise of receivers. A force that begins and ends may come and
+    go itself, as a line that is hauled: so each disturbance is tried within each of those, whose ends cost it nothing.
 
     Parameters
     ----------
@@ -128,7 +129,8 @@ def fit_disturbances(
     known = problem.plain.measurements.profile.hull.is_known
     seen = [one for one in initial if not one.in_velocities]
     before = {one.candidate.key: one for one in seen}
-    noise, states = _selected(steps, gaps, noise, candidates, force_model, minimum_gain, before, closely=known)
+    spans = _spans(steps, made)
+    noise, states = _selected(steps, gaps, noise, candidates, force_model, minimum_gain, before, spans, closely=known)
     velocities = _velocity_steps(problem) if known else None
     narrow = [one for one in candidates if any(parameter.unit == "Hz" for parameter in one.parameters)]
     # Small ones wait for what explains more.
@@ -147,7 +149,7 @@ def fit_disturbances(
         ]
         missing = [one for one in narrow if last and one.key not in found]
         before = {one.candidate.key: one for one in initial if one.in_velocities}
-        more = _selected(velocities, theirs, alone, missing, force_model, minimum_gain, before, closely=True)[1]
+        more = _selected(velocities, theirs, alone, missing, force_model, minimum_gain, before, spans, closely=True)[1]
         for state in more:
             pushes = _pushes(state, force_model)
             states.append(replace(state, in_velocities=True, gain_in_velocities=state.gain))
@@ -157,6 +159,14 @@ def fit_disturbances(
         # On average, too, they may do something.
         plain = state.candidate.act(plain, state.values)
     return replace(problem.with_noise_of(made), filter=noise, plain=plain), tuple(states)
+
+
+def _spans(steps: Windows, made: Fit) -> tuple[StrengthCourse, ...]:
+    """Return the spans of the forces that both begin and end within the steps."""
+    first, last = float(steps.middle_s[0]), float(steps.middle_s[-1])
+    spans = ((one.onset_s, one.offset_s) for one in made.candidates)
+    within = dict.fromkeys((begin, end) for begin, end in spans if first < begin < end < last)
+    return tuple(StrengthCourse(*one, with_force=True) for one in within)
 
 
 class _Found(NamedTuple):
@@ -175,12 +185,14 @@ def _selected(
     force_model: ForceModel,
     minimum_gain: float,
     before: Mapping[tuple[str, str | None], DisturbanceState],
+    spans: Sequence[StrengthCourse],
     *,
     closely: bool,
 ) -> tuple[NoiseModel, list[DisturbanceState]]:
     """Return the noise with the disturbances that gaps speak for, the strongest first, and these.
 
-    `closely`: in spans of the log as well, and beside noise that has given way to them.
+    `spans` are those of forces that were found; `closely`: in spans of the log as well, and beside noise that has given way to
+    them.
     """
     best = likelihood(noise, steps, gaps)
     states: list[DisturbanceState] = []
@@ -217,7 +229,8 @@ def _selected(
         if gain < required_gain:
             break
         if closely and state.candidate.effect.onset:
-            fitted_noise, state, after = _with_course(steps, gaps, noise, fitted_noise, state, after, force_model)
+            found = _Found(fitted_noise, state, after)
+            fitted_noise, state, after = _with_course(steps, gaps, noise, found, force_model, spans)
         noise, best = fitted_noise, after
         states.append(state)
         left.remove(state.candidate)
@@ -239,7 +252,9 @@ def _places(
     The likeliest all along, beside the noise as it is and as it may be with the disturbance, and those in a span of the log.
     """
     if before is not None:
-        return [(before.values, before.course, noise)]
+        # The force that it came and went with may be gone.
+        course = ALL_ALONG if before.course.with_force else before.course
+        return [(before.values, course, noise)]
     assert candidate.effect.unsteady is not None
     processes = candidate.effect.unsteady(force_model)
     starts = _starts(candidate)
@@ -270,12 +285,12 @@ def _with_course(
     steps: Windows,
     gaps: Floats,
     bare: NoiseModel,
-    fitted: NoiseModel,
-    state: DisturbanceState,
-    after: float,
+    found: _Found,
     force_model: ForceModel,
+    spans: Sequence[StrengthCourse],
 ) -> _Found:
     """Return noise, state and log-likelihood with a disturbance in the likeliest course of its strength."""
+    fitted, state, _ = found
     candidate, n = state.candidate, len(steps.starts)
     assert candidate.effect.unsteady is not None
     processes = candidate.effect.unsteady(force_model)
@@ -301,11 +316,11 @@ def _with_course(
             force_model,
         )
         gain = after - course.cost(n) - found.after + found.state.course.cost(n)
-        if gain <= 0.0 or not _is_identified(candidate, values, widths, stride_s(steps)):
+        # Within a force that was found it need not be known as a disturbance of its own: that is what is in question.
+        if gain <= 0.0 or not (course.with_force or _is_identified(candidate, values, widths, stride_s(steps))):
             return found
         return _Found(made, DisturbanceState(candidate, values, widths, found.state.gain + gain, course), after)
 
-    found = _Found(fitted, state, after)
     if not state.course.ends:
         # What it explains all along leaves a channel nothing of its own: calm is what the noise without it is of.
         found = better_in(span_of(bare.channels, state.values), found)
@@ -323,6 +338,8 @@ def _with_course(
             break
     if found.state.course.ends:
         found = better_in(span_of(found.noise.channels, found.state.values), found)
+    for span in spans:
+        found = better_in(span, found)
     if found.state.course == ALL_ALONG:
         return found
     channels, values = found.noise.channels, found.state.values

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
@@ -32,11 +33,15 @@ from ferryid.diagnose.judging.campaign_properties import OutOfStep, PropertyTest
 from ferryid.effects import effects
 from ferryid.effects.actuator_force import force_limits
 from ferryid.effects.effect import HELD
-from ferryid.types import no_progress
+from ferryid.effects.ventilation import drawn
+from ferryid.recursive_filter import lagged
+from ferryid.types import Floats, no_progress
 from tests.diagnose.inference.test_campaign_estimation import CALM, FERRY, campaign
 
 pytestmark = pytest.mark.slow
 
+END = force_limits(FERRY.actuators[0])[0]
+"""The largest force of the first thruster [N]."""
 BAG_WINDOWS = 7
 """Of eight seconds every two: a bag of twenty seconds."""
 
@@ -212,6 +217,11 @@ def test_scores_rank_as_fits_do() -> None:
 @cache
 def limited(limit: float) -> Campaign:
     """Return calm logs whose first thruster gave no more than a force [N], and the second what is missing."""
+    return given(lambda order, step_s: np.minimum(order, limit))
+
+
+def given(by: Callable[[Floats, float], Floats]) -> Campaign:
+    """Return calm logs whose first thruster gave a force by its order [N] and the time between rows, the second the rest."""
     whole = campaign(CALM, conditions=())
 
     def believed(member: Member) -> Member:
@@ -220,8 +230,8 @@ def limited(limit: float) -> Campaign:
         order = (0.5 + 0.5 * np.sin(t / 13.0)) * force_limits(FERRY.actuators[0])[0]
         angle, (x, y) = plain.angles[:, 0], FERRY.actuators[0].position_m
         ahead = np.column_stack([np.cos(angle), np.sin(angle), x * np.sin(angle) - y * np.cos(angle)])
-        given = np.minimum(order, limit)[:, None] * ahead
-        parts = np.stack([order[:, None] * ahead, force - given], axis=1)
+        gave = by(order, member.windows.measurements.step_s)[:, None] * ahead
+        parts = np.stack([order[:, None] * ahead, force - gave], axis=1)
         seen = replace(member.windows.measurements, parts=parts)
         plain = replace(plain, parts=parts, measurements=seen)
         return replace(member, plain=plain, windows=replace(member.windows, measurements=seen))
@@ -231,17 +241,16 @@ def limited(limit: float) -> Campaign:
 
 @pytest.mark.parametrize("share", [0.85, 0.6, 0.35])
 def test_a_limit_of_a_thrusters_force_is_found_from_where_forces_depend_on_it(share: float) -> None:
-    end = force_limits(FERRY.actuators[0])[0]
-    found, rivals = select_properties(estimate_campaign(limited(share * end)), no_progress)
+    found, rivals = select_properties(estimate_campaign(limited(share * END)), no_progress)
     ((limit, _),) = found.campaign.values(found.common, found.own[0])[1]
     assert [one.key for one in found.campaign.properties] == [("thrust_saturation", "thruster1")]
-    assert limit == pytest.approx(share * end, rel=0.03)
+    assert limit == pytest.approx(share * END, rel=0.03)
     # What only takes off a share of a large force is not as good.
     assert all(one.odds < -5.0 for one in rivals["thrust_saturation", "thruster1"])
 
 
 def test_shapes_of_a_thrust_curve_that_explain_nearly_as_much_are_unresolved() -> None:
-    made, _ = select_properties(estimate_campaign(limited(0.6 * force_limits(FERRY.actuators[0])[0])), no_progress)
+    made, _ = select_properties(estimate_campaign(limited(0.6 * END)), no_progress)
     (found,) = made.campaign.properties
     windows = made.campaign.members[0].windows
 
@@ -256,8 +265,53 @@ def test_shapes_of_a_thrust_curve_that_explain_nearly_as_much_are_unresolved() -
     assert unresolved("thruster_gain", "thruster1", 0.99) == ()
 
 
+@cache
+def aired() -> Campaign:
+    """Return calm logs whose first thruster lost half of its force to air above half load, a few seconds late."""
+    return given(lambda order, step_s: order * (1.0 - 0.5 * lagged(drawn(100.0 * order / END, 50.0), 4.0, step_s)))
+
+
+def test_what_adds_nothing_beside_another_leaves_and_is_its_rival() -> None:
+    made = estimate_campaign(aired())
+    limit, air = (Candidate.of(effects()[one], "thruster1", FERRY) for one in ("thrust_saturation", "ventilation"))
+
+    def estimated(begun: CampaignFit) -> CampaignFit:
+        return estimate_campaign(begun.campaign, noise=made.noise, begin=begun)
+
+    def beside_nothing(one: Candidate, other: Candidate) -> CampaignFit:
+        """Return the estimate of one beside another that has come to do nothing."""
+        return estimated(with_property(estimated(with_property(made, one)), other, share=0.0))
+
+    stays, rivals = selection._without_displaced(beside_nothing(air, limit), {}, ())
+    assert stays.campaign.properties == (air,)
+    (tried,) = rivals[air.key]
+    # Where it stood it did nothing; in the other's place it explains a part of what that does.
+    assert tried.candidate == limit
+    assert tried.odds < 0.0
+    assert 0.2 < tried.share < 1.0
+    # What is likelier in the other's place takes it.
+    swapped, rivals = selection._without_displaced(beside_nothing(limit, air), {}, ())
+    assert swapped.campaign.properties == (air,)
+    (left,) = rivals[air.key]
+    assert left.candidate == limit
+    assert (left.odds, left.share) == pytest.approx((tried.odds, tried.share), rel=0.1)
+    assert [one.odds for one in rivals[limit.key]] == [-left.odds]
+    # What the selection began with is judged elsewhere.
+    both = beside_nothing(air, limit)
+    assert selection._without_displaced(both, {}, (limit, air))[0] is both
+
+
+def test_air_that_gathers_in_time_is_no_limit() -> None:
+    found, rivals = select_properties(estimate_campaign(aired()), no_progress)
+    assert [one.key for one in found.campaign.properties] == [("ventilation", "thruster1")]
+    factor, threshold, memory = found.campaign.values(found.common, found.own[0])[1][0]
+    assert (factor, threshold, memory) == pytest.approx((0.5, 50.0, 4.0), rel=0.1)
+    limits = [one for one in rivals["ventilation", "thruster1"] if one.candidate.effect.id == "thrust_saturation"]
+    assert all(one.odds < -20.0 for one in limits)
+
+
 def test_what_a_start_promises_is_what_the_estimate_keeps() -> None:
-    made = estimate_campaign(limited(0.6 * force_limits(FERRY.actuators[0])[0]))
+    made = estimate_campaign(limited(0.6 * END))
     made = estimate_campaign(made.campaign, noise=made.noise, begin=made)
     start = start_of(made, Candidate.of(effects()["thrust_saturation"], "thruster1", FERRY))
     kept = estimate_campaign(start.begun.campaign, noise=made.noise, begin=start.begun)

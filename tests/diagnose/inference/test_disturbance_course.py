@@ -31,6 +31,8 @@ SMALL = 12.0
 """Moment [N·m] whose swing the error of a compass hides."""
 
 
+WEAK = 20.0
+"""Moment [N·m] that is seen for two minutes."""
 MEMORY_S = 6.0
 
 
@@ -86,6 +88,10 @@ def test_what_a_course_costs_grows_with_its_ends() -> None:
     costs = [one.cost(1000) for one in (ALL_ALONG, StrengthCourse(100.0), StrengthCourse(100.0, 200.0))]
     assert costs[0] == 0.0
     assert costs[2] - costs[1] == pytest.approx(np.log(1000.0))
+
+
+def test_the_ends_of_a_force_that_was_found_cost_nothing() -> None:
+    assert StrengthCourse(100.0, 200.0, with_force=True).cost(1000) == 0.0
 
 
 @pytest.mark.slow
@@ -155,3 +161,27 @@ def test_what_positions_alone_show_is_told_by_the_velocities(calm: EstimationPro
     odd = estimation_problem(seen, *prior_force_model(seen.measurements, FERRY))
     assert max(one.gain_in_velocities for one in waves_in(odd)[1]) < 0.0
     assert waves_in(shaken(calm, 150.0))[1][0].gain_in_velocities > 100.0
+
+
+@pytest.mark.slow
+def test_what_comes_and_goes_within_a_force_alone_begins_and_ends_with_it(calm: EstimationProblem) -> None:
+    t = calm.plain.measurements.t
+    from_s, until_s = float(t[0]) + 200.0, float(t[0]) + 320.0
+    push = replace(Candidate.of(effects()["external_push"], None, FERRY), onset_s=from_s, offset_s=until_s)
+
+    def state(case: EstimationProblem, *forces: Candidate) -> DisturbanceState:
+        made = fit(case, forces, [one.start for one in forces])
+        (found,) = fit_disturbances(case, made, [WAVES], case.plain)[1]
+        return found
+
+    heaved = shaken(calm, WEAK, ((t >= from_s) & (t < until_s)).astype(float))
+    alone, beside = state(heaved), state(heaved, push)
+    assert alone.course.ends == 2
+    assert not alone.course.with_force
+    # Beside a force that was found its ends are no choice, and cost nothing.
+    assert beside.course == StrengthCourse(from_s, until_s, with_force=True)
+    assert beside.gain - alone.gain == pytest.approx(alone.course.cost(len(heaved.excerpt.starts)), abs=8.0)
+    for name, end in (("onset", from_s), ("offset", until_s)):
+        assert beside.times[name].low < end < beside.times[name].high
+    # Waves that are there before and after have nothing to do with it.
+    assert state(shaken(calm, 100.0), push).course == ALL_ALONG

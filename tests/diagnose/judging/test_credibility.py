@@ -294,7 +294,9 @@ def test_what_may_as_well_be_none_is_doubted(effect: str, ends: dict[str, tuple[
     [
         ((1.2, 1.6), (0.8, 1.5), (1.1, 1.4), ""),
         ((0.4, 0.8), (0.6, 1.1), (0.5, 0.9), ""),
-        ((0.9, 1.7), (1.1, 1.8), (1.1, 1.7), ""),
+        ((1.0, 1.7), (1.1, 1.8), (1.1, 1.7), "damping in surge, which"),
+        ((0.7, 1.5), (0.9, 1.6), (1.1, 1.7), "damping in surge, which"),
+        ((0.7, 1.1), (0.5, 0.9), (0.6, 1.1), "damping in surge, which"),
         ((0.5, 1.3), (0.8, 1.5), (1.2, 1.8), "damping in yaw has grown and in surge fallen,"),
         ((0.9, 1.3), (0.8, 1.1), (0.5, 0.9), "damping in surge has grown and in yaw fallen,"),
         ((1.2, 1.6), (0.8, 1.5), (0.4, 0.8), "damping in surge has grown and in yaw fallen,"),

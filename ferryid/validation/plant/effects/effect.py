@@ -83,7 +83,8 @@ class PlantEffect:
         That its detection curve is of: the ferry, but for what the ferry's thrusters, which turn round, never do; that is not
         combined with others.
     positions
-        Parameters that say where the effect acts, such as places on the chart: their distance from neutral means nothing.
+        Parameters that say where the effect acts, such as places on the chart, or how fast: their distance from neutral means
+        nothing.
     """
 
     id: str

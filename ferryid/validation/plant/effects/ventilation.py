@@ -67,5 +67,5 @@ EFFECT = PlantEffect(
     act=act,
     realised=realised,
     neutral=1.0,
-    positions=("from",),
+    positions=("from", "time_constant"),
 )
