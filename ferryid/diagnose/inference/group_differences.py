@@ -51,8 +51,10 @@ OF_HULL = frozenset({"fouling"})
 """What a single log shows beside a hull model alone, and groups beside the hull that they share."""
 FAULTS = frozenset({"thruster_gain"})
 """Factors of force. One of the groups has less than the other: a loss in the one, as no actuator gains force of itself."""
-SCATTERS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
+SCATTERS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6)
 """Standard deviations between logs that are averaged over beside none, in sizes of a parameter."""
+WIDE = 0.75 * SCATTERS[-1]
+"""Scatter, averaged over, above which logs of one group differ by all that was looked for."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +86,11 @@ class Comparison:
     smallest: Floats
 
     @property
+    def wide(self) -> bool:
+        """True where logs of one group differ by as much as was looked for, or more."""
+        return self.scatter > WIDE
+
+    @property
     def excludes_none(self) -> bool:
         """True where the 95 % interval of some parameter does not hold its neutral value."""
         neutral = np.array([one.neutral for one in self.candidate.parameters])
@@ -94,8 +101,8 @@ class Comparison:
 class Contender:
     """What was tried in place of a difference that was selected.
 
-    `behind` is its evidence less that of the selected one [nat]; `comparison` what it would be itself, None where the evidence
-    favours it over none as little as that.
+    `behind` is its evidence less that of the selected one, without scatter [nat]: above zero where logs scatter in it so much
+    that no difference is known, or where it is no simpler. `comparison` is what it would be in the other's place.
     """
 
     candidate: Candidate
@@ -191,8 +198,8 @@ def select_differences(
 ) -> tuple[CampaignFit, tuple[tuple[Candidate, tuple[Contender, ...]], ...]]:
     """Return the estimate with every difference that the evidence favours, and what contended with each.
 
-    What all logs share is selected beside them, so that a property of both groups is not taken for a difference. Of several that
-    are less than `unresolved` [nat] apart, by as much as the logs' noise explains of how they differ, the simplest stands first.
+    What all logs share is selected beside them, so that a property of both groups is not taken for a difference. Of several
+    that are less than `unresolved` [nat] apart, beside what the logs differ by beyond their noise, the simplest is first.
     """
     contenders: dict[Candidate, tuple[Contender, ...]] = {}
     while len(made.campaign.properties) < INFERENCE.most_effects:
@@ -245,9 +252,7 @@ def _in_place_of_each_other(
             best = min(near, key=lambda each: (len(each.parameters), -tried[each][1].over_alike))
         behind = tried[best][1].over_alike
         rest = [
-            Contender(each, min(here.over_alike - behind, 0.0), here)
-            for each, (_, here) in tried.items()
-            if each is not best
+            Contender(each, here.over_alike - behind, here) for each, (_, here) in tried.items() if each is not best
         ]
         if best is not one:
             made = estimate_campaign(tried[best][0].campaign, begin=tried[best][0])
@@ -278,8 +283,13 @@ def likeliest_difference(made: CampaignFit, left: Sequence[Candidate]) -> Likeli
     if not likely:
         return None
     best, fit = likely[0]
-    behind = (one for one, _ in tried if one is not best and one.over_alike <= best.over_alike)
-    contenders = tuple(Contender(one.candidate, one.over_alike - best.over_alike) for one in behind)
+    # What logs scatter in by as much is no difference that is known, and may be the one nevertheless.
+    seen = {one.candidate for one, _ in tried}
+    others = [one for one, _ in tried if one is not best]
+    others += [
+        one for one in weighed if _possible(one) and one.candidate not in seen and one.over_alike > best.over_alike
+    ]
+    contenders = tuple(Contender(one.candidate, one.over_alike - best.over_alike) for one in others)
     return Likeliest(best, fit, contenders)
 
 

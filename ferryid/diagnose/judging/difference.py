@@ -40,6 +40,8 @@ class Difference:
         Standard deviation between logs of one group, of the first parameter, in its unit.
     smallest
         By parameter, the distance from neutral that would have been seen with an even chance; None where none would.
+    wide
+        True where logs of one group differ in it by all that was looked for.
     selected
         True where the evidence favours it over none.
     shown_by
@@ -66,6 +68,7 @@ class Difference:
     evidence: float
     scatter: float
     smallest: Mapping[str, float | None]
+    wide: bool = False
     selected: bool = False
     shown_by: str = FORCES
     gain: Gain | None = None

@@ -36,7 +36,7 @@ from ferryid.diagnose.judging.group_loads import LoadDifference, load_difference
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
 from ferryid.effects.effect import Effect
-from ferryid.effects.wording import listed, weak_evidence
+from ferryid.effects.wording import listed, uncapitalised, weak_evidence
 from ferryid.side_by_side import over
 from ferryid.vessel.circumstances import Circumstances
 from ferryid.vessel.profile import Profile
@@ -158,11 +158,19 @@ def judged_difference(made: CampaignFit, candidate: Candidate, contenders: Seque
         instead=tuple(_difference(made, one.comparison) for one in contenders if one.comparison is not None),
         circumstances=Circumstances.of(profile),
     )
-    return replace(found, doubt=_doubt(found, candidate.effect, made.campaign.hull.known, profile))
+    doubt = _doubt(found, candidate.effect, made.campaign.hull.known, profile)
+    return replace(found, doubt=doubt or _surpassed(contenders, made.disagreement))
+
+
+def _surpassed(contenders: Sequence[Contender], apart: float) -> str:
+    """Return that logs scatter in something that explains more than a difference, as the end of a sentence; empty where not."""
+    tolerance = JUDGING.unresolved_evidence * max(1.0, apart)
+    more = [uncapitalised(one.candidate.title) for one in contenders if one.behind > tolerance]
+    return f"{listed(more)} would explain more, and logs of one group differ in that too" if more else ""
 
 
 def _rivals(candidate: Candidate, contenders: Sequence[Contender]) -> tuple[Rival, ...]:
-    rivals = [Rival(one.candidate.effect.id, one.candidate.instance, one.behind) for one in contenders]
+    rivals = [Rival(one.candidate.effect.id, one.candidate.instance, min(one.behind, 0.0)) for one in contenders]
     kept = {(one.effect, one.instance): one for one in reversed(rivals) if (one.effect, one.instance) != candidate.key}
     return tuple(sorted(kept.values(), key=lambda one: -one.delta_score))
 
@@ -172,6 +180,8 @@ def _doubt(one: Difference, effect: Effect, hull_known: bool, profile: Profile) 
     assert one.by_group is not None
     if one.evidence < INFERENCE.prior_odds:
         return f"{weak_evidence(one.evidence, INFERENCE.prior_odds)}, as logs of one group scatter"
+    if one.wide:
+        return "logs of one group differ in it by as much as the groups do"
     if one.gain.low <= 0.0:
         return "held-out stretches of the logs are not surely predicted better with it"
     for group, gain in one.by_group.items():
@@ -208,7 +218,8 @@ def _difference(made: CampaignFit, one: Comparison, *, near: bool = False) -> Di
             estimates[each.name] = Estimate.normal(float(value), float(error), each.unit)
             smallest[each.name] = float(least) if isfinite(least) else None
     size = candidate.parameters[0].size
-    return Difference.of(candidate, estimates, one.evidence, one.scatter * size, smallest, made.disagreement)
+    found = Difference.of(candidate, estimates, one.evidence, one.scatter * size, smallest, made.disagreement)
+    return replace(found, wide=one.wide)
 
 
 def notes_of(judged: JudgedGroups, campaign: Campaign) -> tuple[str, ...]:
@@ -272,10 +283,8 @@ def summary(judged: JudgedGroups) -> str:
     if not judged.differences:
         return f"No difference of the vessel found between the groups.{also}"
     open_ = sum(bool(one.unresolved_with) for one in sure)
-    known = f"{counted(len(sure), 'difference')} confirmed"
-    if open_:
-        whose = "its cause" if len(sure) == 1 else f"the cause of {open_}"
-        known = f"{known}, {whose} being one of several that these logs cannot tell apart,"
-    parts = [known] if sure else []
+    whose = "its cause" if len(sure) == 1 else f"the cause of {open_}"
+    causes = f", {whose} being one of several that these logs cannot tell apart" if open_ else ""
+    parts = [*([f"{counted(len(sure), 'difference')} confirmed"] if sure else [])]
     parts += [f"{counted(hints, 'difference')} estimated, not confirmed"] if hints else []
-    return f"{' and '.join(parts)} between the groups.{also}"
+    return f"{' and '.join(parts)} between the groups{causes}.{also}"
