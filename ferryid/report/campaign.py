@@ -270,7 +270,7 @@ def _sizes(effect: str, every: Sequence[Mapping[str, Estimate]]) -> str:
         told, of_logs = diagnosis_words.in_words(effect, name, [one[name] for one in every if name in one])
         values = [one.value for one in of_logs]
         unit = "" if first.unit in ("-", "") else f" {first.unit}"
-        digits = diagnosis_words.digits_of(first)
+        digits = first.digits
         low, high = f"{min(values):.{digits}f}", f"{max(values):.{digits}f}"
         parts.append(f"{told} {low if low == high else f'{low} to {high}'}{unit}")
     return "; ".join(parts)

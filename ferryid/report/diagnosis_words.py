@@ -184,23 +184,13 @@ def in_words(effect: str, name: str, every: Sequence[Estimate]) -> tuple[str, li
 
 def estimate(one: Estimate) -> str:
     """Return a value with its interval and unit, to the digits that the interval supports."""
-    width, digits = one.high - one.low, digits_of(one)
+    width, digits = one.high - one.low, one.digits
     unit = "" if one.unit in ("-", "") else f" {one.unit}"
     # What rounds to nothing has no sign.
     value = f"{one.value:z.{digits}f}{unit}"
     if not isfinite(width) or width == 0.0:
         return value
     return f"{value} ({one.low:z.{digits}f} to {one.high:z.{digits}f})"
-
-
-def digits_of(one: Estimate) -> int:
-    """Return the decimals of a value that its interval supports, of three digits without one; a whole number has none."""
-    width = one.high - one.low
-    if width == 0.0 and float(one.value).is_integer():
-        return 0
-    if isfinite(width) and width > 0.0:
-        return min(max(1 - _exponent(width), 0), 6)
-    return min(max(2 - _exponent(one.value), 0), 6) if isfinite(one.value) else 0
 
 
 def measured(value: float | None, unit: str) -> str:
@@ -351,13 +341,13 @@ def _brief_size(effect: str, found: Mapping[str, Estimate]) -> str:
     """Return the size of a finding in a few words; empty where none is known."""
     if "north" in found and "east" in found:
         one = found["north"]
-        return _value(hypot(one.value, found["east"].value), digits_of(one), one.unit)
+        return _value(hypot(one.value, found["east"].value), one.digits, one.unit)
     for name, one in found.items():
         if name not in ("onset", "offset"):
             called, (value,) = in_words(effect, name, [one])
             # What has the name of an axis or of a coefficient and no unit is a factor on it.
             factor = name in (*AXES, *COEFFICIENTS) and one.unit in ("-", "")
-            return f"{called} {'× ' if factor else ''}{_value(value.value, digits_of(value), value.unit)}"
+            return f"{called} {'× ' if factor else ''}{_value(value.value, value.digits, value.unit)}"
     return ""
 
 
@@ -566,7 +556,3 @@ def _upper(text: str) -> str:
 
 def _percent(share: float) -> str:
     return f"{100.0 * share:.0f} %" if isfinite(share) else "an unknown share"
-
-
-def _exponent(value: float) -> int:
-    return int(f"{value:e}".partition("e")[2])

@@ -165,6 +165,6 @@ class Difference:
         """Return a parameter with its interval."""
         one = self.estimates[parameter.name]
         name = parameter_word(parameter.name)
-        if parameter.unit == "-":
-            return f"{name} {one.value:.3g} ({one.low:.3g} to {one.high:.3g})"
-        return f"{name} {one.value:+.3g} {one.unit} ({one.low:+.3g} to {one.high:+.3g})"
+        form = f"z.{one.digits}f" if parameter.unit == "-" else f"+z.{one.digits}f"
+        unit = "" if parameter.unit == "-" else f" {one.unit}"
+        return f"{name} {one.value:{form}}{unit} ({one.low:{form}} to {one.high:{form}})"

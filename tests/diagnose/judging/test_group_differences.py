@@ -175,7 +175,7 @@ def test_parameters_and_sizes_are_told_in_words_and_plain_numbers() -> None:
     profile = load_profile("milliampere")
     late = Candidate.of(effects()["time_delay"], None, profile)
     delay = Difference.of(late, {"seconds": Estimate(0.1, -0.2, 0.4, "s")}, 0.0, 0.1, {"seconds": None})
-    assert delay.said(late.parameters[0]) == "delay +0.1 s (-0.2 to +0.4)"
+    assert delay.said(late.parameters[0]) == "delay +0.10 s (-0.20 to +0.40)"
     assert delay.seen_from("seconds") == "delay not seen at any size"
     load = Candidate.of(effects()["payload"], None, profile)
     laden = Difference.of(load, {}, 0.0, 0.1, {"mass": 112.0})

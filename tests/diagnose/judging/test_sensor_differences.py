@@ -73,7 +73,7 @@ def test_a_heading_that_is_off_in_one_group_is_a_difference_and_not_where_all_lo
     assert turned.shown_by == SENSORS
     assert turned.probability > 0.99
     assert turned.estimates["angle"].low < 3.0 < turned.estimates["angle"].high
-    assert turned.says.startswith("Heading bias (sensors compared), B relative to A: angle +3 deg (")
+    assert turned.says.startswith("Heading bias (sensors compared), B relative to A: angle +3.00 deg (")
     same = _difference(HEADING, HEADING.lasting, estimates([3.0, 3.1, 3.1, 3.0], 0.1, "deg", "angle"), "AABB", 1.0)
     assert same is not None
     assert not same.selected
@@ -124,7 +124,7 @@ def test_what_sensors_show_stands_first_and_forces_that_contradict_them_are_hint
     assert summary(found) == "1 difference confirmed between the groups."
     judged = JudgedGroups((of_forces(-3.0),), (), (), (), 1.0)
     (doubted,) = beside_sensors(judged, (none,), hull_known=False).differences
-    assert "the sensors, compared with each other, show no such difference (angle +0 deg" in doubted.doubt
+    assert "the sensors, compared with each other, show no such difference (angle +0.00 deg (-0.20 to +0.20))" in doubted.doubt
     assert doubted.probability == 0.5
     (kept,) = beside_sensors(judged, (none,), hull_known=True).differences
     assert not kept.doubt
