@@ -124,7 +124,8 @@ def compare_groups(
                 f"{counted(INFERENCE.campaign_windows, 'overlapping window')}. Fix: give longer logs"
             )
     campaign = in_groups(assembled[0], [name_of[path] for path in place])
-    sensors = sensor_differences(averaged, [name_of[one.path] for one in averaged])
+    compared = [one for one in averaged if one.path in place]
+    sensors = sensor_differences(compared, [name_of[one.path] for one in compared])
     judged = beside_sensors(judge_groups(campaign, run.progress), sensors, hull_known=campaign.hull.known)
     groups = {
         group: tuple(_group_log(one) for one in averaged if one.path in place and name_of[one.path] == group)

@@ -214,6 +214,8 @@ class Effect:
         whatever the data say, as the end of a sentence; empty where they are as they may be.
     doubt_of_ends
         ``doubt_of_ends(ends)`` does so by the lower and upper ends of 95 % intervals by name, where a value may be chance.
+    later
+        Parameters that models of before lack, which are neutral in these.
     scales
         True where it multiplies all that an actuator gives: of a vessel with one actuator and no hull model, a factor on its
         masses and damping does the same.
@@ -271,6 +273,7 @@ class Effect:
     unsteady: Callable[[ForceModel], Processes] | None = None
     doubt: Callable[[Values, Profile], str] = lambda values, profile: ""
     doubt_of_ends: Callable[[Mapping[str, tuple[float, float]]], str] = lambda ends: ""
+    later: tuple[str, ...] = ()
     scales: bool = False
     of_thrust_curve: bool = False
     out_of_step: bool = False

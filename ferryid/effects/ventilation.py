@@ -160,5 +160,6 @@ EFFECT = Effect(
     vessel=True,
     regressor=regressor,
     negligible=EFFECTS.least_ventilation,
+    later=(MEMORY,),
     simulated=Simulated(thrust=change, constants=constants, lacks=frozenset({MEMORY})),
 )

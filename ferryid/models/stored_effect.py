@@ -212,7 +212,14 @@ def _effect(data: Mapping[str, Any], profile: Profile, where: str, vessel: bool)
 
 def _parameters(effect: Effect, data: Mapping[str, Any], profile: Profile) -> dict[str, Quantity]:
     parameters = {name: _quantity(one, f"{effect.id}.{name}") for name, one in data.items()}
-    expected = {one.name: one.unit for one in effect.parameters_of(profile)}
+    known = effect.parameters_of(profile)
+    # Files of before it was fitted: it changed nothing.
+    parameters |= {
+        one.name: Quantity(one.neutral, one.neutral, one.neutral, one.unit)
+        for one in known
+        if one.name in effect.later and one.name not in parameters
+    }
+    expected = {one.name: one.unit for one in known}
     found = {name: one.unit for name, one in parameters.items()}
     # What was chosen in view of a log may lack what later versions fit beside it, which comes last.
     complete = len(found) == len(expected) or (

@@ -95,7 +95,7 @@ def unresolved(one: Difference) -> str:
     """Return what a difference cannot be separated from, and the manoeuvre that would; empty where there is none."""
     if not one.unresolved_with:
         return ""
-    near = [each for each in one.instead if each.effect in one.unresolved_with]
+    near = [each for each in one.instead if each.key in one.near]
     others = [f"{uncapitalised(each.title)}, {each.group or 'both groups'}: {each.values}" for each in near]
     others = others or [uncapitalised(title(each)) for each in one.unresolved_with]
     return (

@@ -23,7 +23,7 @@ from ferryid.models.forces.hull_terms import unmapped_terms
 from ferryid.models.forces.model_forces import ModelForces, acting_estimator
 from ferryid.models.model import Model, model_to_json
 from ferryid.models.store.versions import load_file, save
-from ferryid.models.stored_effect import Conditions, Quantity, Source, StoredEffect
+from ferryid.models.stored_effect import Conditions, Quantity, Source, StoredEffect, _parameters
 from ferryid.vessel import load_profile
 from tests.models.test_store import made
 
@@ -266,3 +266,14 @@ def test_zeta_divides_the_force_of_a_measured_payload_too() -> None:
     found = required_force(ModelForces(model).plain(measurements), nu_dot)
     wanted = model_estimator(model)(nu_dot, nu, psi, measurements.wind, None, payload)
     np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-9)
+
+
+def test_a_loss_by_air_of_before_its_time_constant_was_fitted_acts_at_once() -> None:
+    effect = effects()["ventilation"]
+    known = effect.parameters_of(load_profile("milliampere"))
+    data = {one.name: {"value": 0.5, "low": 0.4, "high": 0.6, "unit": one.unit} for one in known[:-1]}
+    read = _parameters(effect, data, load_profile("milliampere"))
+    assert list(read) == [one.name for one in known]
+    assert read["time_constant"].value == 0.0
+    with pytest.raises(ValueError, match="takes the parameters"):
+        _parameters(effect, {known[0].name: data[known[0].name]}, load_profile("milliampere"))

@@ -105,6 +105,52 @@ def test_from_the_recording_to_the_page(tmp_path: Path, monkeypatch: pytest.Monk
         validated(out, zigzag(tmp_path / "zigzag.dat", 241.0))
 
 
+class Comparer:
+    """A comparison that looks at nothing but how far the antenna moved between the first log of each group."""
+
+    sources = source_hash()
+
+    def diagnose(
+        self, log: Path, profile: Path, out: Path, more: Sequence[Path] = (), before: Sequence[Path] = ()
+    ) -> Diagnosis:
+        (first,) = before
+        assert sorted(path.name for path in log.parent.iterdir()) == sorted([log.name, first.name, "vessel.toml"])
+        eta, was = (read_log(str(path), load_profile(profile)).measurements.eta for path in (log, first))
+        away = (eta - was)[:, :2]
+        c, s = np.cos(eta[:, 2]), np.sin(eta[:, 2])
+        x, y = (float(np.mean(one)) for one in (c * away[:, 0] + s * away[:, 1], c * away[:, 1] - s * away[:, 0]))
+        found = (finding("lever_arm", {"x": x, "y": y}),) if np.hypot(x, y) > LEAST_M else ()
+        return Diagnosis("different" if found else "alike", 1.0, found)
+
+
+@pytest.mark.slow
+def test_what_is_concealed_in_one_group_is_to_be_found_beside_the_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("march.dat", "may.dat"):
+        zigzag(tmp_path / name, 240.0)
+    manifest = tmp_path / "list.toml"
+    manifest.write_text(
+        'schema = "ferryid.recordings/1"\n[[recording]]\nname = "may"\nvessel = "kvlcc2-model"\n'
+        'before = ["march.dat"]\ncampaign = ["may.dat"]\nonly = ["lever_arm", "dead_band", "thruster_lag"]\n',
+        encoding="utf-8",
+    )
+    monkeypatch.setattr(stages, "worker_of", lambda run: Comparer())
+    pipeline = recorded_pipeline(str(manifest), None)
+    pipeline = replace(pipeline, evaluators={})
+    options: dict[str, Any] = {"seed": 7, "only": ["lever_arm"], "processes": 1}
+    options |= {"progress": lambda stage: None, "announce": lambda line: None}
+    result = run_validation(tmp_path / "out", pipeline, **options)
+    assert result["scores"]["responses"] == []
+    (change,) = result["scores"]["changes"]
+    assert change["named"] == [size > LEAST_M for size in change["sizes"]]
+    assert 0 < sum(change["named"]) < 5
+    assert result["scores"]["recoveries"][0]["median_error"] < 1e-3
+    text = (tmp_path / "out" / "proof-real" / "proof-real.md").read_text("utf-8")
+    assert "## What changed between two groups" in text
+    assert any(one["what"].startswith("what changed between two groups") for one in result["targets"])
+
+
 RUN: dict[str, Any] = {
     "settings": {"real": "list.toml", "runs": 1.0, "only": []},
     "seed": 7,

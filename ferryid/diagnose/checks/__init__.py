@@ -112,7 +112,8 @@ def _refiltered(findings: Sequence[SensorFinding], measured: Measurements, corre
         return corrected
     filtered = refilter_velocity(corrected)
     # Angles on a grid were moved between its steps: forces of the recorded ones would undo that.
-    return filtered if "azimuth_resolution" in errors else at_velocity(filtered)
+    same = np.array_equal(corrected.nu_raw, measured.nu_raw, equal_nan=True)
+    return filtered if same or "azimuth_resolution" in errors else at_velocity(filtered)
 
 
 def sensor_errors(measurements: Measurements) -> dict[str, Mapping[str, Estimate]]:

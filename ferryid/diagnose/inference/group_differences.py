@@ -225,6 +225,11 @@ def select_differences(
     return _in_place_of_each_other(made, contenders, unresolved)
 
 
+def _known(one: Comparison) -> bool:
+    """Return whether the evidence favours a difference that logs of one group do not scatter in by all that was looked for."""
+    return one.evidence >= INFERENCE.prior_odds and not one.wide
+
+
 def _in_place_of_each_other(
     made: CampaignFit, contenders: dict[Candidate, tuple[Contender, ...]], unresolved: float
 ) -> tuple[CampaignFit, tuple[tuple[Candidate, tuple[Contender, ...]], ...]]:
@@ -236,19 +241,16 @@ def _in_place_of_each_other(
     for one in [each for each in made.campaign.properties if each.group]:
         without = without_property(made, one)
         taken = made.campaign.properties
-        # The evidence of the one that stands there, under the same noise.
-        settled = estimate_campaign(made.campaign, noise=made.noise, begin=made)
-        best, tried = one, {one: (settled, compare_estimated(settled, one, without))}
+        best, tried = one, {one: (made, compare_estimated(made, one, without))}
         for other in contenders.get(one, ()):
             if other.candidate.group and other.candidate not in taken:
                 fit = _estimated(without, other.candidate)
                 tried[other.candidate] = fit, compare_estimated(fit, other.candidate, without)
-        likely = [each for each, (_, here) in tried.items() if here.evidence >= INFERENCE.prior_odds]
+        least = max(here.over_alike for _, here in tried.values()) - unresolved * max(1.0, made.disagreement)
+        near = [each for each, (_, here) in tried.items() if here.over_alike >= least and _known(here)]
         # An interval that holds none is no name where another's does not.
-        likely = [each for each in likely if tried[each][1].excludes_none] or likely
-        if likely:
-            least = max(tried[each][1].over_alike for each in likely) - unresolved * max(1.0, made.disagreement)
-            near = [each for each in likely if tried[each][1].over_alike >= least]
+        near = [each for each in near if tried[each][1].excludes_none] or near
+        if near:
             best = min(near, key=lambda each: (len(each.parameters), -tried[each][1].over_alike))
         behind = tried[best][1].over_alike
         rest = [

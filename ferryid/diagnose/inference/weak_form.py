@@ -295,6 +295,7 @@ def _thinned(measurements: Measurements, every: int) -> Measurements:
         usable=np.asarray(measurements.usable[: n * every].reshape(n, every).all(axis=1)),
         wind=some(measurements.wind),
         current=some(measurements.current),
+        actuation={},
         payload=some(measurements.payload),
         rudders=some(measurements.rudders),
     )

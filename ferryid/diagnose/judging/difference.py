@@ -119,23 +119,27 @@ class Difference:
         away = min(max(self.evidence - INFERENCE.prior_odds, -700.0), 700.0)
         probability = 1.0 / (1.0 + exp(-away))
         # Of those that explain the same about as well, any may be the one.
-        resolved = [behind for effect, behind in self._behind() if effect not in self.unresolved_with]
+        resolved = [behind for _, behind in self._behind() if behind <= -JUDGING.unresolved_evidence]
         probability /= 1.0 + sum(map(exp, resolved))
         return probability if self.selected and not self.doubt else min(probability, JUDGING.hint_probability)
 
     @property
     def unresolved_with(self) -> tuple[str, ...]:
         """Effects that explain the same about as well."""
-        near = [effect for effect, behind in self._behind() if behind > -JUDGING.unresolved_evidence]
-        return tuple(dict.fromkeys(near))
+        return tuple(dict.fromkeys(effect for effect, _ in self.near))
 
-    def _behind(self) -> list[tuple[str, float]]:
+    @property
+    def near(self) -> tuple[tuple[str, str | None], ...]:
+        """Effect and instance of these."""
+        return tuple(key for key, behind in self._behind() if behind > -JUDGING.unresolved_evidence)
+
+    def _behind(self) -> list[tuple[tuple[str, str | None], float]]:
         """Return each rival with how far it is behind.
 
         Logs that differ by more than their noise hold less evidence for the one over the other: a quasi-likelihood, divided by
         the excess of the variance (Burnham and Anderson, 2002, Model Selection and Multimodel Inference, section 2.5).
         """
-        return [(one.effect, one.delta_score / max(1.0, self.apart)) for one in self.rivals]
+        return [((one.effect, one.instance), one.delta_score / max(1.0, self.apart)) for one in self.rivals]
 
     @property
     def separating_manoeuvre(self) -> str | None:

@@ -112,9 +112,10 @@ def beside_sensors(judged: JudgedGroups, sensors: Sequence[Difference], *, hull_
     """
     selected = [one for one in sensors if one.selected]
     of_sensors = {one.key for one in selected}
-    forces = judged.differences
+    # What forces show was estimated with the sensors' errors taken out.
+    forces = tuple(one for one in judged.differences if one.key not in of_sensors)
     if not hull_known:
-        forces = tuple(replace(one, doubt=one.doubt or _unseen_by_sensors(one, sensors)) for one in judged.differences)
+        forces = tuple(replace(one, doubt=one.doubt or _unseen_by_sensors(one, sensors)) for one in forces)
     differences = sorted([*selected, *forces], key=lambda one: (bool(one.doubt), -one.evidence))
     compared = [one for one in judged.compared if one.key not in of_sensors]
     compared += [one for one in sensors if not one.selected]
@@ -188,7 +189,8 @@ def _doubt(one: Difference, effect: Effect, hull_known: bool, profile: Profile) 
         if gain.high < 0.0:
             return f"held-out stretches of group {group} are predicted worse with it"
     values = {name: each.value for name, each in one.estimates.items()}
-    if doubt := value_doubt(effect, one.parameters, values, profile):
+    ends = {name: (each.low, each.high) for name, each in one.estimates.items()}
+    if doubt := value_doubt(effect, one.parameters, values, profile) or effect.doubt_of_ends(ends):
         return doubt
     if not _excludes(one):
         return "no interval excludes that there is none"

@@ -221,7 +221,8 @@ def distinctness(
     logs, white = [*recording, *before], _and_none(change.white, before)
     conditions = _conditions(logs, truth)
     # A level that both groups have in common.
-    common = [_stacked(logs, [base.responses[0] for base in logs], truth.key)] if before else []
+    shown = before and any(truth.key in base.responses[0] for base in logs)
+    common = [_stacked(logs, [base.responses[0] for base in logs], truth.key)] if shown else []
     alone = _beside(white, np.hstack([_of_any_hull(logs), *conditions, *common])) / SIGMAS
     known, beside = [np.vstack([base.problem.by_hull for base in logs]), *conditions, *common], inf
     none = [dict[Key, Floats]()] * len(before)
