@@ -154,13 +154,14 @@ class Part:
         plain = len(scores.unaltered)
         doses = {one.effect: one for one in pooled([each.doses for each in scores.responses])}
         twice, distinct = joined("all", doses.values()).at_twice, from_twice_distinct(scores.responses)
+        every = [flag for one in scores.changes for flag in one.named]
+        changed = Share(sum(every), len(every))
         said = (
             f"{counted(scores.runs - plain, 'altered recording')} beside {plain} as they were",
             f"{scores.right.text} of all sizes"
             + (f"; {twice.text} at twice the oracle's size" if twice.of else "")
-            + (
-                f"; {distinct.text} from twice the size on at which no other effect does as well" if distinct.of else ""
-            ),
+            + (f"; {distinct.text} from twice the size on at which no other effect does as well" if distinct.of else "")
+            + (f"; of what changed between two groups of recordings {changed.text} of all sizes" if changed.of else ""),
             f"a name neither concealed nor in the recording as it was in {scores.wrong.text}",
             f"{', '.join(one.recording for one in scores.unaltered)}, their records changed so that the effect explains them",
             _sources(result),
