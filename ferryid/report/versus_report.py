@@ -99,8 +99,8 @@ def unresolved(one: Difference) -> str:
     others = [f"{uncapitalised(each.title)}, {each.group or 'both groups'}: {each.values}" for each in near]
     others = others or [uncapitalised(title(each)) for each in one.unresolved_with]
     return (
-        f"These logs cannot tell it from {', or '.join(others)} (evidence within {JUDGING.unresolved_evidence:g} nat); what "
-        f"separates them: {one.separating_manoeuvre}."
+        f"These logs cannot distinguish it from {', or '.join(others)} (evidence within {JUDGING.unresolved_evidence:g} nat); "
+        f"what separates them: {one.separating_manoeuvre}."
     )
 
 

@@ -286,7 +286,7 @@ def summary(judged: JudgedGroups) -> str:
         return f"No difference of the vessel found between the groups.{also}"
     open_ = sum(bool(one.unresolved_with) for one in sure)
     whose = "its cause" if len(sure) == 1 else f"the cause of {open_}"
-    causes = f", {whose} being one of several that these logs cannot tell apart" if open_ else ""
+    causes = f", {whose} being one of several that these logs cannot distinguish" if open_ else ""
     parts = [*([f"{counted(len(sure), 'difference')} confirmed"] if sure else [])]
     parts += [f"{counted(hints, 'difference')} estimated, not confirmed"] if hints else []
     return f"{' and '.join(parts)} between the groups{causes}.{also}"
