@@ -56,8 +56,8 @@ NO_DECISION = {
     """,
     "shapes of formulas, and priors of parameters": """
         diagnose.inference.campaign_estimation SCALE_GAPS
-        diagnose.inference.group_differences SCATTERS WIDE
-        diagnose.judging.sensor_differences SCATTERS WIDEST_OF_ERRORS WIDEST_SEEN SIZES LEAST_KNOWN
+        diagnose.inference.group_differences SCATTERS
+        diagnose.judging.sensor_differences SCATTERS WIDEST_OF_ERRORS WIDEST_SEEN SIZES
         effects.shallow_water EDGE_M
         effects.thruster_gain LEAST_LEVEL
         effects.thruster_interaction SQUARINGS

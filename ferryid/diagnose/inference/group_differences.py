@@ -53,8 +53,6 @@ FAULTS = frozenset({"thruster_gain"})
 """Factors of force. One of the groups has less than the other: a loss in the one, as no actuator gains force of itself."""
 SCATTERS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6)
 """Standard deviations between logs that are averaged over beside none, in sizes of a parameter."""
-WIDE = 0.75 * SCATTERS[-1]
-"""Scatter, averaged over, above which logs of one group differ by all that was looked for."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +86,7 @@ class Comparison:
     @property
     def wide(self) -> bool:
         """True where logs of one group differ by as much as was looked for, or more."""
-        return self.scatter > WIDE
+        return self.scatter > INFERENCE.wide_scatter * SCATTERS[-1]
 
     @property
     def excludes_none(self) -> bool:

@@ -264,6 +264,12 @@ class InferenceThresholds:
         "power above which a block is part of a burst",
         "convention: beyond the scatter of even noise",
     )
+    wide_scatter: float = threshold(
+        0.75,
+        "of the largest looked for",
+        "scatter of a property between logs of one group, above which a difference between groups is none that is known",
+        "tuned on runs of a catamaran in random halves, whose thrust scatters by a half from run to run",
+    )
 
 
 INFERENCE = InferenceThresholds()

@@ -21,6 +21,7 @@ from ferryid.diagnose.inference.group_differences import GROUPS, gross
 from ferryid.diagnose.inference.stages import AveragedLog
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.difference import SENSORS, Difference
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
 from ferryid.effects.effect import Parameter
 from ferryid.side_by_side import over
@@ -32,8 +33,6 @@ WIDEST_OF_ERRORS, WIDEST_SEEN = 16.0, 2.0
 """The largest of them, in standard errors of the logs, or in what logs of one group scatter by, whichever is more."""
 SIZES = np.geomspace(1e-4, 10.0, 101)
 """Differences among which the smallest that would have been seen is looked for, in usual sizes."""
-LEAST_KNOWN = 3.0
-"""Standard errors that the factor of a group must be from zero for another to be compared with it."""
 
 
 @dataclass(frozen=True)
@@ -153,7 +152,7 @@ def _difference(
             # A factor of one group over that of the other, which must be known to be any.
             w = errors[~second] ** -2.0
             first = float(w @ values[~second] / w.sum())
-            if abs(first) < LEAST_KNOWN * float(w.sum()) ** -0.5:
+            if abs(first) < JUDGING.known_factor * float(w.sum()) ** -0.5:
                 return None
             values, errors = values / first, errors / abs(first)
         parameters.append(Parameter(name, shape.unit, lasting.size, -inf, inf, lasting.neutral))

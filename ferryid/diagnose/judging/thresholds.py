@@ -432,6 +432,12 @@ class JudgingThresholds:
         "squared error left over the squared force that moves the vessel, above which an axis is mostly unexplained",
         "derived: more is left than is explained",
     )
+    known_factor: float = threshold(
+        3.0,
+        "standard errors",
+        "of a sensor's factor in one group of logs from zero, below which no other is compared with it",
+        "convention: surely not zero",
+    )
 
 
 JUDGING = JudgingThresholds()
