@@ -30,6 +30,8 @@ except ImportError:  # Windows: two fits at once into one folder may then take t
 
 ABANDONED_S = 3600.0
 """Age from which on a temporary file belongs to no process that is at work, where the file system has no locks [s]."""
+_AT_ONCE = 8
+"""Files that are synced at once: the threads wait for the disk alone."""
 _NOT_SUPPORTED = (errno.EINVAL, errno.ENOTSUP, errno.ENOSYS, errno.ENOLCK, errno.EPERM)
 _TEMPORARY = re.compile(r"\.(?P<name>.+)\.(?P<key>[0-9a-f]{32})\.(?P<part>part|part\.d|old|lock)", re.DOTALL)
 
@@ -291,10 +293,21 @@ def _sync_all(path: Path) -> None:
     if not path.is_dir():
         sync(path)
         return
-    for folder, _, names in os.walk(path, topdown=False):
-        for name in names:
-            if stat.S_ISREG(os.lstat(os.path.join(folder, name)).st_mode):
-                sync(Path(folder, name))
+    walked = list(os.walk(path, topdown=False))
+    every = [Path(folder, name) for folder, _, names in walked for name in names]
+    files = [file for file in every if stat.S_ISREG(os.lstat(file).st_mode)]
+    if len(files) > 1:
+        # Loading it takes longer than writing many a single file.
+        from concurrent.futures import ThreadPoolExecutor
+
+        # A journal takes all that is asked for at once in one turn, and what is asked for one after the other in one turn each.
+        with ThreadPoolExecutor(min(_AT_ONCE, len(files))) as pool:
+            for _ in pool.map(sync, files):
+                pass
+    else:
+        for file in files:
+            sync(file)
+    for folder, _, _ in walked:
         sync(Path(folder))
 
 

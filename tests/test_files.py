@@ -218,7 +218,9 @@ def test_all_of_a_folder_is_synced_before_it_is_renamed(tmp_path: Path, calls: l
         (temporary / "figures" / "a").touch()
         (temporary / "b").touch()
     name = temporary.name
-    assert calls == ["fsync a", "fsync figures", "fsync b", f"fsync {name}", "replace report", f"fsync {tmp_path.name}"]
+    # Files at once, in any order, and folders when all that is in them is on disk.
+    assert sorted(calls[:2]) == ["fsync a", "fsync b"]
+    assert calls[2:] == ["fsync figures", f"fsync {name}", "replace report", f"fsync {tmp_path.name}"]
 
 
 def test_a_file_system_without_links_and_syncs_is_written_all_the_same(
