@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.special import chdtri
 
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.types import Floats
@@ -45,6 +44,9 @@ class LogCondition:
     @property
     def significant(self) -> bool:
         """Whether it differs from none."""
+        # A tenth of a second to import: only where it is needed.
+        from scipy.special import chdtri
+
         size = float(self.values @ np.linalg.solve(self.covariance, self.values))
         return size > float(chdtri(len(self.values), IDENTIFY.condition_level))
 

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import stdtrit
 
 from ferryid.regression import REGRESSION
 from ferryid.regression.resampling import paired_block_seconds, sum_over_blocks
@@ -80,6 +79,9 @@ def _interval(sums: Floats) -> tuple[float, float] | None:
         return None
     ratios = model / base
     ratio = float(ratios.mean())
+    # A tenth of a second to import: only where it is needed.
+    from scipy.special import stdtrit
+
     # A block's part in the logarithm of the mean; that of all blocks is none.
     parts = ((sums[:, 0] - ratios * sums[:, 1]) / base).mean(axis=1) / ratio
     error = np.sqrt(blocks / (blocks - 1.0) * np.sum(parts**2))
