@@ -4,62 +4,40 @@ from __future__ import annotations
 
 import os
 import pickle
-from collections.abc import Callable
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import ParamSpec, TypeVar
 
-from ferryid.report.drawings import Drawings
-
-P = ParamSpec("P")
-Page = TypeVar("Page")
+from ferryid.report.drawings import Calls, drawn
 
 
-@dataclass(frozen=True)
-class _Half(Drawings):
-    """Every other drawing that a page asks for; the others are left empty."""
-
-    first: int = 0
-    made: dict[str, str] = field(default_factory=dict)
-    _asked: list[str] = field(default_factory=list)
-
-    def of(self, file: str, draw: Callable[P, str], *args: P.args, **named: P.kwargs) -> str:
-        self._asked.append(file)
-        if len(self._asked) % 2 == self.first:
-            self.made[file] = draw(*args, **named)
-        return self.made.get(file, "")
-
-
-def drawn_by_two(page: Callable[[Drawings], Page]) -> Page:
-    """Return what `page` makes of its drawings, half of which a forked process makes; what that one fails at is made here.
+def drawn_by_two(calls: Calls) -> dict[str, str]:
+    """Return the drawings by the names of their files; what the copy fails at is made here.
 
     For a process that is about to end. One with other threads is not forked: a lock that they hold would stay held in the copy.
     """
     if not _alone():
-        return page(Drawings())
+        return drawn(calls)
+    names = list(calls)
     end, begin = os.pipe()
     child = os.fork()
     if child == 0:
         try:
-            half = _Half(first=1)
-            page(half)
+            half = drawn({name: calls[name] for name in names[::2]})
             with os.fdopen(begin, "wb") as answers:
-                pickle.dump(half.made, answers, protocol=5)
+                pickle.dump(half, answers, protocol=5)
         finally:
             os._exit(0)
     os.close(begin)
-    made = _Half()
     try:
-        page(made)
+        made = drawn({name: calls[name] for name in names[1::2]})
     finally:
         with os.fdopen(end, "rb") as answers:
             theirs = answers.read()
         os.waitpid(child, 0)
     try:
-        drawn = pickle.loads(theirs)
+        made |= pickle.loads(theirs)
     except (EOFError, ValueError, pickle.UnpicklingError):  # it failed, and so will what it failed at
-        drawn = {}
-    return page(Drawings({**made.made, **drawn}))
+        made |= drawn({name: calls[name] for name in names[::2]})
+    return {name: made[name] for name in names}
 
 
 def _alone() -> bool:

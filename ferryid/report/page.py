@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from ferryid.identify import FitOutcome, LogFit
 from ferryid.models import RANGE_UNITS, ForceScores
 from ferryid.models.forces import effective_mass
 from ferryid.report import figures
-from ferryid.report.drawings import NONE, Drawings
+from ferryid.report.drawings import Asked, Calls, Drawings, drawn
 from ferryid.report.fit_timeline import fit_timeline
 from ferryid.report.folder import made
 from ferryid.report.headline import headline_of
@@ -41,7 +41,7 @@ def page_of(
     out: Path,
     command: Sequence[str],
     given: Given = NOTHING,
-    drawings: Drawings = NONE,
+    draw: Callable[[Calls], Mapping[str, str]] = drawn,
 ) -> Page:
     """Return the report of a fit.
 
@@ -55,12 +55,12 @@ def page_of(
         The words that it was asked for with.
     given
         Logs and options among them.
-    drawings
-        Those that exist already.
+    draw
+        Makes the drawings.
     """
     timelines = {k: fit_timeline(log) for k, log in enumerate(result.logs[:MAX_LOGS])}
     interactive = interactive_of(timelines, folder, out)
-    text, every = render(result, interactive, made(command), drawings, given)
+    text, every = render(result, interactive, made(command), draw, given)
     return text, every, interactive.files()
 
 
@@ -69,39 +69,48 @@ def load_all() -> None:
     pages = template("fit.html").environment
     for name in ("figures.html", "left_out.html", "style.html"):
         pages.get_template(name)
-    figure = figures.margins(1.0)
-    figure.subplots().set_title("fonts")
-    figures.svg_text(figure)
+    # A figure with all that those of a page have: fonts, a legend, a logarithmic axis, and points as a picture.
+    with figures.styled():
+        figure = figures.margins(1.0)
+        ax = figure.subplots()
+        ax.set_title("fonts")
+        ax.semilogy([1.0, 10.0], [1.0, 10.0], ".", label="points", rasterized=True)
+        figures.plain_log(ax, x=False, y=True)
+        figures.legend_above(figure, ax, 1)
+        figures.svg_text(figure)
 
 
 def render(
     result: FitOutcome,
     interactive: Interactive = STATIC,
     origin: Mapping[str, str] | None = None,
-    drawings: Drawings = NONE,
+    draw: Callable[[Calls], Mapping[str, str]] = drawn,
     given: Given = NOTHING,
 ) -> tuple[str, dict[str, str]]:
     """Return the report of a fit as HTML with the drawings inside, and the drawings (SVG) by name.
 
-    `origin` is what `ferryid.report.folder.made` returns, `drawings` are those that exist already, and `given` is what the fit
-    was given.
+    `origin` is what `ferryid.report.folder.made` returns, `draw` makes the drawings, and `given` is what the fit was given.
     """
-    context = {**_context(result, interactive, drawings), "made": origin}
+    asked = Asked()
+    context = {**_context(result, interactive, asked), "made": origin}
     context["next"] = after_fit(result.model.label, result.acceptance.accepted, given)
-    return with_contents(template("fit.html").render(context)), dict(_drawings(context))
+    every = dict(draw(asked.calls))
+    for figure in _figures(context):
+        figure["svg"] = every[figure["file"]]
+    return with_contents(template("fit.html").render(context)), every
 
 
-def _drawings(part: Any) -> Iterator[tuple[str, str]]:
-    """Yield name and drawing of every figure of a context."""
+def _figures(part: Any) -> Iterator[dict[str, Any]]:
+    """Yield every figure of a context."""
     if isinstance(part, dict):
         if "svg" in part:
-            yield part["file"], part["svg"]
+            yield part
         else:
             for value in part.values():
-                yield from _drawings(value)
+                yield from _figures(value)
     elif isinstance(part, list):
         for value in part:
-            yield from _drawings(value)
+            yield from _figures(value)
 
 
 _HOLDS = {True: "yes", False: "no", None: "not known"}
@@ -109,7 +118,7 @@ _HOLDS = {True: "yes", False: "no", None: "not known"}
 
 def _context(result: FitOutcome, interactive: Interactive, drawings: Drawings) -> dict[str, Any]:
     model, verdict = result.model, result.acceptance
-    drawn = result.logs[:MAX_LOGS]
+    shown = result.logs[:MAX_LOGS]
     left = [log.motion.log for log in result.logs[MAX_LOGS:]]
     return {
         "title": parse_profile(model.profile_text, model.name).title,
@@ -144,7 +153,7 @@ def _context(result: FitOutcome, interactive: Interactive, drawings: Drawings) -
         "split_notes": result.scores.split_notes,
         "logs": [
             {"name": log.motion.log, "figures": _force_figures(log, drawings), "timeline": interactive.number(k)}
-            for k, log in enumerate(drawn)
+            for k, log in enumerate(shown)
         ],
         "assets": interactive.assets,
         "omitted": f"Not drawn, but part of every number: {', '.join(left)}." if left else "",
@@ -154,20 +163,20 @@ def _context(result: FitOutcome, interactive: Interactive, drawings: Drawings) -
             if run.note
         ],
         "free_run_figures": _free_run_figures(result, drawings),
-        "residual_lines": [line for log in drawn for line in remainder(log)],
+        "residual_lines": [line for log in shown for line in remainder(log)],
         "residual_figures": []
-        if not drawn
+        if not shown
         else [
             {
                 "file": "residual-spectrum",
-                "svg": drawings.of("residual-spectrum", figures.residual_spectrum, drawn),
+                "svg": drawings.of("residual-spectrum", figures.residual_spectrum, shown),
                 "caption": "Power spectral density of measured minus estimated force. A peak at some tenths of a hertz "
                 "is mostly waves; what stays at the lowest frequencies is wind, current or a wrong model. The regular "
                 "notches are zeros of the smoothing window.",
             },
             {
                 "file": "residual-autocorrelation",
-                "svg": drawings.of("residual-autocorrelation", figures.residual_autocorrelation, drawn),
+                "svg": drawings.of("residual-autocorrelation", figures.residual_autocorrelation, shown),
                 "caption": "Autocorrelation of the same residual. White noise would stay inside the dashed band; a slow "
                 "decay shows that something with a memory was left out, and that neighbouring samples are no independent "
                 "evidence.",
@@ -203,11 +212,11 @@ def _context(result: FitOutcome, interactive: Interactive, drawings: Drawings) -
         "excitation_lines": _excitation_lines(result),
         "undetermined": sorted(result.excitation.undetermined.items()),
         "excitation_figures": []
-        if not drawn
+        if not shown
         else [
             {
                 "file": "excitation",
-                "svg": drawings.of("excitation", figures.excitation, result.excitation, drawn),
+                "svg": drawings.of("excitation", figures.excitation, result.excitation, shown),
                 "caption": "Top left: singular values of the standardised basis; a value near zero is a combination of "
                 "terms that this trial does not identify. The rest: velocities in the training rows, each pair against "
                 "the other; a model is only as good as the cloud it saw.",

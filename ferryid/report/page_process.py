@@ -177,7 +177,7 @@ def serve_page() -> None:
         load_all()
         asked: tuple[FitOutcome, Path, Path, Sequence[str], Given] = request()
         # Who asked waits meanwhile: its core is free for half of the drawings.
-        answer(drawn_by_two(lambda drawings: page_of(*asked, drawings=drawings)))
+        answer(page_of(*asked, draw=drawn_by_two))
 
 
 def serve_drawings() -> None:

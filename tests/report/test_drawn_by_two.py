@@ -13,7 +13,7 @@ from ferryid.report import drawn_by_two
 
 PROGRAM = """
 import json, os
-from ferryid.report.drawings import Drawings
+from functools import partial
 from ferryid.report.drawn_by_two import drawn_by_two
 
 own = os.getpid()
@@ -23,10 +23,7 @@ def draw(name):
         raise ValueError(name)
     return f"{{name}} {{'here' if os.getpid() == own else 'beside'}}"
 
-def page(drawings: Drawings) -> list[str]:
-    return [drawings.of(name, draw, name) for name in ("a", "b", "c", "d", "e")]
-
-print(json.dumps(drawn_by_two(page)))
+print(json.dumps(list(drawn_by_two({{name: partial(draw, name) for name in "abcde"}}).values())))
 """
 
 
@@ -51,7 +48,7 @@ def test_a_process_with_other_threads_is_not_copied(monkeypatch: pytest.MonkeyPa
     other = threading.Thread(target=ended.wait)
     other.start()
     try:
-        assert drawn_by_two.drawn_by_two(lambda drawings: drawings.of("a", lambda: "a")) == "a"
+        assert drawn_by_two.drawn_by_two({"a": lambda: "a"}) == {"a": "a"}
     finally:
         ended.set()
         other.join()
