@@ -90,7 +90,7 @@ class MotionData(FitData):
         """Basis and residual of the training rows."""
         return factorise(*self._training_rows(), names=self.functions.terms, where=self.where)
 
-    @property
+    @cached_property
     def without_force(self) -> Flags:
         """Axes on which no actuator acts on the training rows, shape (3,)."""
         rows = self.split.training

@@ -19,7 +19,7 @@ from ferryid.identify.ratio_interval import LogErrors, ratio_interval
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.shared_rows import SharedRows
 from ferryid.identify.split import Split
-from ferryid.identify.weak_rows import WeakRows, average_over_windows
+from ferryid.identify.weak_rows import WeakRows
 from ferryid.models import ForceScores, ModelScores, force_scores
 from ferryid.models.forces import effective_mass, without_sway_coupling
 from ferryid.regression.bases import Basis
@@ -83,16 +83,12 @@ class PredictionWindows:
         return self._averaged(self.split.training, self.length_s, steadied=self._chosen[0])
 
     def _averaged(self, masks: Sequence[Flags], length_s: float, *, steadied: bool) -> tuple[WeakRows, ...]:
-        every = []
-        for motion, mask in zip(self.motions, masks, strict=True):
-            velocity = self.shared.velocity(motion, steadied=steadied)
-            columns = self.shared.columns(motion, self.profile, self.settings.scale, self.functions, steadied=steadied)
-            every.append(
-                average_over_windows(
-                    motion, mask, self.profile, self.settings.scale, self.functions, length_s, velocity, columns
-                )
+        return tuple(
+            self.shared.windows(
+                motion, mask, self.profile, self.settings.scale, self.functions, length_s, steadied=steadied
             )
-        return tuple(every)
+            for motion, mask in zip(self.motions, masks, strict=True)
+        )
 
     @property
     def velocities(self) -> tuple[Floats, ...]:

@@ -1,4 +1,4 @@
-"""What folds of the training rows and windows of several lengths have in common: the rows of the logs that they average."""
+"""What folds of the training rows and windows of several lengths have in common: rows of the logs, and averages over them."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from ferryid.identify.weak_rows import row_columns
+from ferryid.identify.weak_rows import WeakRows, average_over_windows, row_columns
 from ferryid.regression.bases import Basis
 from ferryid.signals.complementary_filter import complementary_filter
 from ferryid.signals.track import Motion
-from ferryid.types import Floats
+from ferryid.types import Flags, Floats
 from ferryid.vessel.profile import Profile
 
 MOST_ROWS = 250_000
@@ -25,6 +25,7 @@ class SharedRows:
         self._steadied: dict[int, tuple[Motion, Floats]] = {}
         self._columns: dict[tuple[Any, ...], tuple[tuple[Any, ...], Mapping[str, Floats]]] = {}
         self._rows: dict[int, int] = {}
+        self._windows: dict[tuple[Any, ...], WeakRows] = {}
 
     def velocity(self, motion: Motion, *, steadied: bool) -> Floats:
         """Return the velocity of a log, shape (n, 3): as measured, or with slow errors replaced by the position's."""
@@ -40,7 +41,7 @@ class SharedRows:
     ) -> Mapping[str, Floats]:
         """Return `row_columns` of a log."""
         made_of = motion, profile, functions
-        key = *(id(one) for one in made_of), steadied, *sorted(scale.items())
+        key = self._key(motion, profile, scale, functions, steadied)
         if key in self._columns:
             return self._columns[key][1]
         velocity = self.velocity(motion, steadied=steadied)
@@ -52,3 +53,32 @@ class SharedRows:
             self._rows = rows
             self._columns[key] = made_of, found
         return found
+
+    def windows(
+        self,
+        motion: Motion,
+        rows: Flags,
+        profile: Profile,
+        scale: Mapping[str, float],
+        functions: Basis,
+        length_s: float,
+        *,
+        steadied: bool,
+    ) -> WeakRows:
+        """Return `average_over_windows` of marked rows of a log, which both estimators of a fold ask for."""
+        columns = self.columns(motion, profile, scale, functions, steadied=steadied)
+        key = self._key(motion, profile, scale, functions, steadied)
+        place = *key, length_s, rows.tobytes()
+        if place in self._windows:
+            return self._windows[place]
+        velocity = self.velocity(motion, steadied=steadied)
+        found = average_over_windows(motion, rows, profile, scale, functions, length_s, velocity, columns)
+        if key in self._columns:
+            self._windows[place] = found
+        return found
+
+    @staticmethod
+    def _key(
+        motion: Motion, profile: Profile, scale: Mapping[str, float], functions: Basis, steadied: bool
+    ) -> tuple[Any, ...]:
+        return id(motion), id(profile), id(functions), steadied, *sorted(scale.items())

@@ -11,11 +11,12 @@ import pytest
 from ferryid.identify import shared_rows
 from ferryid.identify.feasible import LiftTie, feasible_gains
 from ferryid.identify.split import Split
-from ferryid.identify.weak_rows import to_force
+from ferryid.identify.weak_rows import WeakRows, to_force
 from ferryid.identify.window_length import prediction_scatter, with_best_length
 from ferryid.models.forces import effective_mass
 from ferryid.regression.bases import make_basis
 from ferryid.signals.track import Motion
+from ferryid.types import Flags
 from tests.identify.rounds import PROFILE
 from tests.identify.test_weak_form import BASIS, SCALE, K, data_of
 from tests.identify.trials import measured
@@ -121,6 +122,22 @@ def test_rows_of_another_scale_or_basis_are_made_anew() -> None:
     assert again is one
     assert not np.array_equal(heavier["steady"], one["steady"])
     assert other["functions"].shape != one["functions"].shape
+
+
+def test_windows_that_were_averaged_before_are_not_averaged_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    shared, (motion,) = shared_rows.SharedRows(), data_of([measured(1, seconds=120.0)]).motions
+    every, some = np.ones(len(motion.t), dtype=bool), np.arange(len(motion.t)) < 600
+
+    def windows(rows: Flags, length_s: float, *, steadied: bool = False) -> WeakRows:
+        return shared.windows(motion, rows, PROFILE, SCALE, BASIS, length_s, steadied=steadied)
+
+    first = windows(every, 8.0)
+    assert windows(every.copy(), 8.0) is first
+    for other in (windows(some, 8.0), windows(every, 12.0), windows(every, 8.0, steadied=True)):
+        assert other is not first
+    monkeypatch.setattr(shared_rows, "MOST_ROWS", 0)
+    shared = shared_rows.SharedRows()
+    assert windows(every, 8.0) is not windows(every, 8.0)
 
 
 def test_forces_that_are_taken_off_go_with_the_velocity_that_enters_products() -> None:
