@@ -429,15 +429,18 @@ class WeakData(LogData):
         """How much wider the prior has to be than stated for what the data say, one at least: empirical Bayes."""
         sums, sigma = CrossProducts.of(*self.whitened.rows), self.whitening.sigma
         Sxx, Sxy = sums.centred()[:2]
+        axes = []
+        for axis in range(3):
+            some = np.flatnonzero(self.functions.mask[:, axis] & np.isfinite(self.prior_spread[:, axis]))
+            normal, right = Sxx[np.ix_(some, some)] / sigma[axis] ** 2, Sxy[some, axis] / sigma[axis] ** 2
+            axes.append((self.prior_spread[some, axis], normal, right, np.eye(len(some))))
         factor = 1.0
         for _ in range(IDENTIFY.expectation_steps):
             sizes = []
-            for axis in range(3):
-                some = self.functions.mask[:, axis] & np.isfinite(self.prior_spread[:, axis])
-                spread = factor * self.prior_spread[some, axis]
-                unit = np.outer(spread, spread)
-                inverse = np.linalg.inv(Sxx[np.ix_(some, some)] / sigma[axis] ** 2 * unit + np.eye(len(spread)))
-                found = inverse @ (Sxy[some, axis] / sigma[axis] ** 2 * spread)
+            for stated, normal, right, one in axes:
+                spread = factor * stated
+                inverse = np.linalg.inv(normal * np.outer(spread, spread) + one)
+                found = inverse @ (right * spread)
                 sizes.append(found**2 + np.diag(inverse))
             factor *= float(np.sqrt(np.mean(np.concatenate(sizes))))
         return float(np.clip(factor, 1.0, IDENTIFY.widest_prior))
