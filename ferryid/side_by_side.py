@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable
 from functools import wraps
-from importlib import import_module
 from threading import Event, Thread, local
 from typing import Any, ParamSpec, TypeVar
 
@@ -81,43 +79,6 @@ def over(function: Callable[[T], R], items: Iterable[T], *, most: int | None = N
     if failed:
         raise failed[min(failed)]
     return [made[k] for k in range(len(every))]
-
-
-@contextmanager
-def loading(*modules: str) -> Iterator[None]:
-    """Load modules on a thread while a block runs, which waits for them at its end.
-
-    For what takes long to load and is needed at the end of a block, or after it, where the block itself waits for files, or
-    for loops that let go of the interpreter's lock.
-
-    Parameters
-    ----------
-    modules
-        Names of modules. What one fails at when it is loaded is raised where it is imported to be used.
-    """
-    missing = [name for name in modules if name not in sys.modules]
-    if not missing or usable_cores() < 2:
-        yield
-        return
-    ended = Event()
-
-    def load() -> None:
-        try:
-            for name in missing:
-                import_module(name)
-        except Exception:  # noqa: BLE001 - raised again where the module is used
-            pass
-        finally:
-            ended.set()
-
-    try:
-        Thread(target=load, daemon=True).start()
-    except RuntimeError:  # no room for a thread
-        ended.set()
-    try:
-        yield
-    finally:
-        ended.wait()
 
 
 def blas_on_one_thread(call: Callable[P, R]) -> Callable[P, R]:

@@ -10,13 +10,12 @@ import time
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from operator import call
-from pathlib import Path
 from threading import Barrier, get_ident
 
 import pytest
 
 from ferryid import side_by_side
-from ferryid.side_by_side import loading, over
+from ferryid.side_by_side import over
 
 CORES = 3
 
@@ -137,25 +136,6 @@ def test_what_has_begun_ends_before_an_interrupt_is_raised(monkeypatch: pytest.M
     finally:
         signal.signal(signal.SIGINT, before)
     assert len(ended) == 1
-
-
-def test_modules_are_loaded_while_a_block_runs_and_are_there_after_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "loaded_slowly.py").write_text(
-        "import threading, time\ntime.sleep(0.1)\nthread = threading.get_ident()\n", encoding="utf-8"
-    )
-    (tmp_path / "cannot_be_loaded.py").write_text("1 / 0\n", encoding="utf-8")
-    monkeypatch.syspath_prepend(str(tmp_path))
-    with pytest.raises(KeyError), loading("cannot_be_loaded", "loaded_slowly"):
-        raise KeyError
-    assert "loaded_slowly" not in sys.modules, "after one that fails no other is loaded"
-    try:
-        with loading("loaded_slowly"):
-            assert not hasattr(sys.modules.get("loaded_slowly"), "thread")
-        assert sys.modules["loaded_slowly"].thread != get_ident()
-    finally:
-        sys.modules.pop("loaded_slowly", None)
 
 
 @pytest.mark.slow

@@ -18,7 +18,6 @@ from ferryid.ingest.clocks import ClockReport, Rows, repair_all
 from ferryid.ingest.hashing import content_hash
 from ferryid.ingest.log import Reader, Series, Topic
 from ferryid.ingest.many_rows import of_each
-from ferryid.side_by_side import loading
 from ferryid.signals import cache
 from ferryid.signals.data_quality import data_quality, grouped_notes, loss_sentence, main_loss
 from ferryid.signals.empty_streams import without_empty
@@ -56,10 +55,7 @@ def record(
         For a log that cannot be used: no known format, a required signal that it lacks, no row, a range outside it, an
         unwritable `out`.
     """
-    # Tables are written when all is read.
-    with loading(*(() if out is None else ("pyarrow.parquet",))):
-        whole = _whole(path, profile, out, verify=verify)
-    return cut(whole, profile, ranges)
+    return cut(_whole(path, profile, out, verify=verify), profile, ranges)
 
 
 def _whole(path: str | Path, profile: Profile, out: Path | None, *, verify: bool) -> Recording:
