@@ -37,7 +37,7 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
     arm = to_world(np.full_like(r, x), np.full_like(r, y), measurements.psi)
     eta = measurements.eta - np.column_stack([*arm, np.zeros_like(r)])
     antenna = (force_model.antenna[0] + x, force_model.antenna[1] + y)
-    return replace(corrected(force_model, replace(measurements, eta=eta, nu=nu)), antenna=antenna)
+    return corrected(force_model, replace(measurements, eta=eta, nu=nu)).replaced(antenna=antenna)
 
 
 def says(values: Values, instance: str | None) -> str:

@@ -22,7 +22,7 @@ from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.effects import effects
 from ferryid.effects.effect import HELD
-from ferryid.effects.force_model import ForceModel
+from ferryid.effects.force_model import ForceModel, moved_coefficient
 from ferryid.types import Floats, Ints
 
 MAX_ITERATIONS = 24
@@ -162,6 +162,24 @@ class EstimationProblem:
         changes /= HULL_DIFFERENCE
         # Column by column, as those of a starting point lie: products of the two are rounded alike.
         return np.asfortranarray(self.whitening_filter.white(changes))
+
+    def changes(self, force_model: ForceModel, others: Sequence[ForceModel], white: Floats) -> Floats:
+        """Return by how much the whitened prediction errors of others differ from those of a force model, shape (w, k).
+
+        `white` are the latter's, shape (w,). What differs in one coefficient of the hull alone is worked out with others like it.
+        """
+        made = np.empty((len(white), len(others)))
+        places = [moved_coefficient(force_model, one) for one in others]
+        of_hull = [k for k, place in enumerate(places) if place is not None]
+        rest = [k for k, place in enumerate(places) if place is None]
+        if of_hull:
+            at = np.array([places[k] for k in of_hull])
+            moves = np.array([others[k].hull[i] for k, i in zip(of_hull, at, strict=True)]) - force_model.hull[at]
+            made[:, of_hull] = self.whitening_filter.white(self.steps.hull_changes(force_model, at, moves))
+        if rest:
+            gaps = np.stack([self.steps.gap(others[k]) for k in rest], axis=2)
+            made[:, rest] = self.whitening_filter.white(gaps) - white[:, None]
+        return made
 
     def white(self, force_model: ForceModel) -> Floats:
         """Return the whitened prediction errors of a force model, flat."""
@@ -330,8 +348,7 @@ def fit(
             moved = np.repeat(z[None], len(free), axis=0)
             moved[np.arange(len(free)), h + free] += d
             there = [moved_from(chain, one, acts[k]) for k, one in zip(free.tolist(), moved, strict=True)]
-            gaps = np.stack([problem.steps.gap(one) for one in there], axis=2)
-            by_effects = (problem.whitening_filter.white(gaps) - w[:, None]) / d
+            by_effects = problem.changes(chain[-1], there, w) / d
         across = by_hull.T @ by_effects
         products[:many, :many], products[:many, many:] = of_hull, across
         products[many:, :many], products[many:, many:] = across.T, by_effects.T @ by_effects
