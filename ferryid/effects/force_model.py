@@ -6,7 +6,7 @@ An effect takes a force model and returns another, in which its own physics acts
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import cos, inf, sin
 from typing import Any
 
@@ -20,7 +20,6 @@ from ferryid.effects.wind_loads import shape_of, steady_wind_force, weighed_load
 from ferryid.types import Flags, Floats, Ints
 from ferryid.vessel.hull import payload_mass
 from ferryid.vessel.profile import Profile
-from ferryid.vessel.wind import wind_force
 
 MASS = ("m11", "m22", "m23", "m32", "m33")
 SURGE = ("X_u", "X_|u|u", "X_uuu")
@@ -137,10 +136,11 @@ class Measurements:
     @cached_property
     def air_load(self) -> Floats:
         """Load of the wind that was measured, of still air where none was [N, N, N·m], shape (n, 3)."""
-        areas = self.profile.wind
-        if areas is None:
+        if self.profile.wind is None:
             return np.zeros((len(self.t), 3))
-        return wind_force(areas, np.zeros((len(self.t), 2)) if self.wind is None else self.wind, self.psi, self.nu)
+        if self.wind is None:
+            return wind_load(self, np.zeros(2))
+        return wind_load_by_row(self, self.wind, np.zeros((1, 2)), _ONE_WIND)
 
 
 @dataclass(frozen=True)

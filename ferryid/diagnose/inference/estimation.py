@@ -166,7 +166,7 @@ class EstimationProblem:
     def changes(self, force_model: ForceModel, others: Sequence[ForceModel], white: Floats) -> Floats:
         """Return by how much the whitened prediction errors of others differ from those of a force model, shape (w, k).
 
-        `white` are the latter's, shape (w,). What differs in one coefficient of the hull alone is worked out with others like it.
+        `white` are the latter's, shape (w,). Those that differ in one coefficient of the hull alone are worked out together.
         """
         made = np.empty((len(white), len(others)))
         places = [moved_coefficient(force_model, one) for one in others]
