@@ -16,7 +16,7 @@ from ferryid.diagnose.inference.candidate import acting_order
 from ferryid.diagnose.inference.candidate import apply_candidates as apply_candidates
 from ferryid.diagnose.inference.folds import Folds, folds_of
 from ferryid.diagnose.inference.newton_step import newton_step
-from ferryid.diagnose.inference.noise_estimation import excerpt, fit_noise
+from ferryid.diagnose.inference.noise_estimation import SEARCHED_STEPS, excerpt, fit_noise
 from ferryid.diagnose.inference.noise_model import NoiseModel, WhiteningFilter, make_whitening_filter
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
@@ -252,6 +252,7 @@ def fit(
     steps: int = MAX_ITERATIONS,
     begin: StartingPoint | None = None,
     least: float = -inf,
+    from_afar: bool = False,
 ) -> Fit:
     """Fit a hypothesis by Gauss-Newton steps on the posterior.
 
@@ -273,6 +274,8 @@ def fit(
     least
         Evidence below which nobody asks: a fit that would stay below it, however far off its linearisation may be
         (`INFERENCE.linearisation_factor`), ends where it is.
+    from_afar
+        True where the slope at the start leads a part of the way only: the first steps are made in any case.
     """
     every = [parameter for candidate in candidates for parameter in candidate.parameters]
     size = np.array([parameter.size for parameter in every])
@@ -363,7 +366,8 @@ def fit(
         whole = newton_step(A, slope, lowest, highest)
         promised = -float(2.0 * slope @ whole + whole @ A @ whole)
         # The score test: what the linearisation promises, and a multiple of it as the most that there may be.
-        if least > -inf and evidence_of(cost - promised * INFERENCE.linearisation_factor, A) < least:
+        known = least > -inf and (not from_afar or count >= SEARCHED_STEPS)
+        if known and evidence_of(cost - promised * INFERENCE.linearisation_factor, A) < least:
             break
         for damping in DAMPINGS if promised >= CONVERGED_GAIN else ():
             # Levenberg's and Marquardt's way, where the whole step leads astray.
