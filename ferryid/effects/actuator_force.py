@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
@@ -42,10 +41,10 @@ def scaled(force_model: ForceModel, k: int, share: Floats) -> ForceModel:
         more = (share - 1.0) * parts[:, k, 0]
         parts[:, k, 0] += more
         parts[:, k, 2] -= actuator.position_m[1] * more
-        return replace(force_model, parts=parts)
+        return force_model.replaced(parts=parts)
     check_actuators(force_model)
     parts, share = np.ascontiguousarray(force_model.parts), np.ascontiguousarray(share)
-    return replace(force_model, parts=_with_share(parts, k, share))
+    return force_model.replaced(parts=_with_share(parts, k, share))
 
 
 @compiled

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import radians
 from typing import Any
 
@@ -36,7 +35,7 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
     parts[:, k, 0], parts[:, k, 1] = c * X - s * Y, s * X + c * Y
     parts[:, k, 2] = x * parts[:, k, 1] - y * parts[:, k, 0]
     angles[:, k] += radians(p[0])
-    return replace(force_model, parts=parts, angles=angles)
+    return force_model.replaced(parts=parts, angles=angles)
 
 
 def says(values: Values, instance: str | None) -> str:

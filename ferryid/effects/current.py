@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import atan2, degrees, hypot
 from typing import Any
 
@@ -25,7 +24,7 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Let the water move."""
     flow = np.broadcast_to(p, (len(force_model.measurements.t), 2))
-    return replace(force_model, flow=flow if force_model.flow is None else force_model.flow + flow)
+    return force_model.replaced(flow=flow if force_model.flow is None else force_model.flow + flow)
 
 
 def cannot(measurements: Measurements) -> str:

@@ -11,7 +11,6 @@ payload. It also has to stand out: see `ferryid.diagnose.inference.onset_estimat
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 from math import atan2, cos, degrees, hypot, sin, sqrt
 
@@ -50,7 +49,7 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
     """Add the push."""
     psi = force_model.measurements.psi
     X, Y = to_body(np.full_like(psi, p[0]), np.full_like(psi, p[1]), psi)
-    return replace(force_model, external=force_model.external + np.column_stack([X, Y, np.full_like(psi, p[2])]))
+    return force_model.replaced(external=force_model.external + np.column_stack([X, Y, np.full_like(psi, p[2])]))
 
 
 def load(

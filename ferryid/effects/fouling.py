@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -34,7 +33,7 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
     for names, factor in zip(SECOND_ORDER, p.tolist(), strict=True):
         for name in names:
             hull[COEFFICIENTS.index(name)] *= factor
-    return replace(force_model, hull=hull)
+    return force_model.replaced(hull=hull)
 
 
 def cannot(measurements: Measurements) -> str:

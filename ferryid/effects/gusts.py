@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -23,7 +22,7 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
 
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Let a wind be gusty, which raises its mean load."""
-    return replace(force_model, gust_std=float(p[0]))
+    return force_model.replaced(gust_std=float(p[0]))
 
 
 def unsteady(force_model: ForceModel) -> Processes:

@@ -33,7 +33,7 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
     u, v, r = measurements.nu.T
     nu = np.column_stack([c * u - s * v, s * u + c * v, r])
     eta = measurements.eta - np.array([0.0, 0.0, b])
-    return replace(corrected(force_model, replace(measurements, eta=eta, nu=nu)), turned=force_model.turned + b)
+    return corrected(force_model, replace(measurements, eta=eta, nu=nu)).replaced(turned=force_model.turned + b)
 
 
 def says(values: Values, instance: str | None) -> str:

@@ -14,7 +14,6 @@ another vessel.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import lgamma, log
 from typing import Any
 
@@ -96,8 +95,8 @@ def _best_subset(G: Floats, b: Floats, names: list[str], usual: float) -> tuple[
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Multiply the coefficients."""
     factor = np.ones(len(COEFFICIENTS))
-    factor[hull_of(force_model.measurements.profile) != 0.0] = p
-    return replace(force_model, hull=force_model.hull * factor)
+    factor[force_model.measurements.modelled] = p
+    return force_model.replaced(hull=force_model.hull * factor)
 
 
 def cannot(measurements: Measurements) -> str:

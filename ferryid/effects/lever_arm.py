@@ -15,7 +15,6 @@ from ferryid.effects.force_model import ForceModel, corrected
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
 from ferryid.vessel.dimensions import off_hull
-from ferryid.vessel.frames import to_world
 from ferryid.vessel.profile import Profile
 
 
@@ -32,12 +31,16 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
     if x == 0.0 and y == 0.0:
         return force_model
     measurements = force_model.measurements
-    r = measurements.nu[:, 2]
-    nu = measurements.nu + np.column_stack([r * y, -r * x, np.zeros_like(r)])
-    arm = to_world(np.full_like(r, x), np.full_like(r, y), measurements.psi)
-    eta = measurements.eta - np.column_stack([*arm, np.zeros_like(r)])
+    nu, eta, (cos, sin) = measurements.nu.copy(), measurements.eta.copy(), measurements.pointing
+    nu[:, 0] += y * measurements.nu[:, 2]
+    nu[:, 1] -= x * measurements.nu[:, 2]
+    eta[:, 0] -= cos * x - sin * y
+    eta[:, 1] -= sin * x + cos * y
+    moved = replace(measurements, eta=eta, nu=nu)
+    # The heading is the same: its cosine and sine need not be worked out again.
+    moved.__dict__["pointing"] = measurements.pointing
     antenna = (force_model.antenna[0] + x, force_model.antenna[1] + y)
-    return replace(corrected(force_model, replace(measurements, eta=eta, nu=nu)), antenna=antenna)
+    return corrected(force_model, moved).replaced(antenna=antenna)
 
 
 def says(values: Values, instance: str | None) -> str:

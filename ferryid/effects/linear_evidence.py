@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from ferryid.effects.effect import Residual
@@ -25,7 +23,7 @@ def hull_jacobian(
     for k in places:
         hull = force_model.hull.copy()
         hull[k] += DIFFERENCE_STEP * prior_hull[k]
-        columns.append((residual(replace(force_model, hull=hull)) - e) / DIFFERENCE_STEP)
+        columns.append((residual(force_model.replaced(hull=hull)) - e) / DIFFERENCE_STEP)
         away.append(force_model.hull[k] / prior_hull[k] - 1.0 if prior_hull[k] != 0.0 else 0.0)
     J = np.column_stack(columns)
     return J, e - J @ np.array(away)

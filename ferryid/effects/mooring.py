@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import cos, sin
 from typing import Any
 
@@ -38,7 +37,7 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
     external = force_model.external.copy()
     external[:, 0] += cosine * north + sine * east
     external[:, 1] += cosine * east - sine * north
-    return replace(force_model, external=external)
+    return force_model.replaced(external=external)
 
 
 def load(

@@ -47,12 +47,15 @@ def _by_mass(profile: Profile) -> float:
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Put the mass aboard."""
     n = len(force_model.measurements.t)
-    load = aboard(p[None, :2])
-    if len(p) < 3:
-        return force_model.with_load(np.repeat(load, n, axis=0))
-    more = float(p[2] * p[0]) * _by_mass(force_model.measurements.profile)
-    load += more * added_mass(force_model)
-    return force_model.with_load(np.repeat(load, n, axis=0)).damped(np.full(n, 1.0 + more))
+    load = aboard(p[None, :2])[0]
+    more = 0.0
+    if len(p) > 2:
+        more = float(p[2] * p[0]) * _by_mass(force_model.measurements.profile)
+        load += more * added_mass(force_model)
+    every = np.empty((n, len(load)))
+    every[:] = load
+    loaded = force_model.with_load(every)
+    return loaded if len(p) < 3 else loaded.damped(np.full(n, 1.0 + more))
 
 
 def unreported(measurements: Measurements, p: Floats) -> frozenset[str]:

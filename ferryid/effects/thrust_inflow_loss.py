@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -29,7 +28,7 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
     check_actuators(force_model)
     places = np.array([one.position_m for one in measurements.profile.actuators]).reshape(-1, 2)
     parts, nu = map(np.ascontiguousarray, (force_model.parts, measurements.nu))
-    return replace(force_model, parts=_with_loss(parts, nu, flow_along_vessel(force_model), places, float(p[0])))
+    return force_model.replaced(parts=_with_loss(parts, nu, flow_along_vessel(force_model), places, float(p[0])))
 
 
 @compiled

@@ -86,7 +86,7 @@ def _multiplied(force_model: ForceModel, factor: Floats, k: int) -> ForceModel:
     parts, actuator = force_model.parts.copy(), measurements.profile.actuators[k]
     if measurements.rudders is None or not actuator.rudder:
         parts[:, k] *= np.reshape(factor, (-1, 1))
-        return replace(force_model, parts=parts)
+        return force_model.replaced(parts=parts)
     thrust, helm = measurements.rudders[:, k].T
     flow = 0.0 if measurements.current is None else current_in_body(measurements.current, measurements.psi)
     nu = measurements.nu - flow
@@ -94,7 +94,7 @@ def _multiplied(force_model: ForceModel, factor: Floats, k: int) -> ForceModel:
     ahead = force_at(actuator, (factor - 1.0) * kept * thrust, actuator.angle_rad)
     steered = rudder_behind(actuator, helm, factor * thrust, nu) - rudder_behind(actuator, helm, thrust, nu)
     parts[:, k] += actuator.count * (ahead + steered)
-    return replace(force_model, parts=parts)
+    return force_model.replaced(parts=parts)
 
 
 def says(values: Values, instance: str | None) -> str:

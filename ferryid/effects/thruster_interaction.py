@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -36,7 +35,7 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
     for j in range(len(actuators)):
         most[:, j] = _full(force_model, j)
     parts = np.ascontiguousarray(force_model.parts)
-    return replace(force_model, parts=_with_loss(parts, places, most, float(p[0])))
+    return force_model.replaced(parts=_with_loss(parts, places, most, float(p[0])))
 
 
 @compiled

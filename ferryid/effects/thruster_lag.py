@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -39,7 +38,7 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
             parts[:, k, 2] = x * parts[:, k, 1] - y * parts[:, k, 0]
         else:
             parts[:, k] = late(parts[:, k])
-    return replace(force_model, parts=parts)
+    return force_model.replaced(parts=parts)
 
 
 def says(values: Values, instance: str | None) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -27,7 +26,7 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
         return force_model
     t = force_model.measurements.t
     flat = np.ascontiguousarray(force_model.parts).reshape(len(t), -1)
-    return replace(force_model, parts=_looked_up(flat, t, t - p[0]).reshape(force_model.parts.shape))
+    return force_model.replaced(parts=_looked_up(flat, t, t - p[0]).reshape(force_model.parts.shape))
 
 
 @compiled

@@ -75,7 +75,7 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
     external = mean_load(measurements, air, force_model.gust_std) - measurements.air_load
     external *= factors
     external += force_model.external
-    return replace(force_model, external=external, air=air, air_factors=factors)
+    return force_model.replaced(external=external, air=air, air_factors=factors)
 
 
 def unreported(measurements: Measurements, p: Floats) -> frozenset[str]:

@@ -136,7 +136,7 @@ NO_DECISION = {
         diagnose.judging.held_out IMITATION_STEPS IMITATION_DIFFERENCE
         diagnose.inference.kalman CONVERGED FEW WIDE
         diagnose.inference.noise_estimation START_SHARES DIFFERENCE_STEP FIRST_DAMPING LEAST_DAMPING LARGEST_DAMPING
-        diagnose.inference.noise_estimation LONGEST_STEP SUFFICIENT_GAIN SEARCHED_STEPS
+        diagnose.inference.noise_estimation LONGEST_STEP SUFFICIENT_GAIN SCREENED_GAIN SEARCHED_STEPS
         diagnose.inference.onset_estimation FIRST_TIME_STEP_S LAST_TIME_STEP_S COMPARING_ITERATIONS LIKELIER
         diagnose.inference.profile_likelihood FIRST_STEP STEP_GROWTH LARGEST_FALL MOST_REFINEMENTS QUANTILES
         diagnose.inference.search COARSE_ITERATIONS

@@ -43,13 +43,13 @@ class OtherHeading:
     def acted(self, act: Callable[[ForceModel], ForceModel], force_model: ForceModel) -> ForceModel:
         """Return a force model in which something acts as if the vessel had had this heading."""
         other, cos, sin = self.of(force_model.measurements)
-        acted = act(replace(force_model, measurements=other))
+        acted = act(force_model.replaced(measurements=other))
         if acted.flow is force_model.flow or acted.flow is None:
-            return replace(force_model, external=acted.external)
+            return force_model.replaced(external=acted.external)
         # Water that meets the other heading from where it would have met this one.
         north, east = acted.flow.T
         flow = np.column_stack([cos * north - sin * east, sin * north + cos * east])
-        return replace(force_model, external=acted.external, flow=flow)
+        return force_model.replaced(external=acted.external, flow=flow)
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ class Candidate:
         touched = self.touched
         if touched is None or any(getattr(force_model, name) is not getattr(before, name) for name in touched):
             return self.act(force_model, p)
-        return replace(force_model, **{name: getattr(after, name) for name in touched})
+        return force_model.replaced(**{name: getattr(after, name) for name in touched})
 
     @cached_property
     def touched(self) -> frozenset[str] | None:

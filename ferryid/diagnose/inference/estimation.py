@@ -16,13 +16,13 @@ from ferryid.diagnose.inference.candidate import acting_order
 from ferryid.diagnose.inference.candidate import apply_candidates as apply_candidates
 from ferryid.diagnose.inference.folds import Folds, folds_of
 from ferryid.diagnose.inference.newton_step import newton_step
-from ferryid.diagnose.inference.noise_estimation import excerpt, fit_noise
+from ferryid.diagnose.inference.noise_estimation import SEARCHED_STEPS, excerpt, fit_noise
 from ferryid.diagnose.inference.noise_model import NoiseModel, WhiteningFilter, make_whitening_filter
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.effects import effects
 from ferryid.effects.effect import HELD
-from ferryid.effects.force_model import ForceModel
+from ferryid.effects.force_model import ForceModel, moved_coefficient
 from ferryid.types import Floats, Ints
 
 MAX_ITERATIONS = 24
@@ -163,6 +163,24 @@ class EstimationProblem:
         # Column by column, as those of a starting point lie: products of the two are rounded alike.
         return np.asfortranarray(self.whitening_filter.white(changes))
 
+    def changes(self, force_model: ForceModel, others: Sequence[ForceModel], white: Floats) -> Floats:
+        """Return by how much the whitened prediction errors of others differ from those of a force model, shape (w, k).
+
+        `white` are the latter's, shape (w,). Those that differ in one coefficient of the hull alone are worked out together.
+        """
+        made = np.empty((len(white), len(others)))
+        places = [moved_coefficient(force_model, one) for one in others]
+        of_hull = [k for k, place in enumerate(places) if place is not None]
+        rest = [k for k, place in enumerate(places) if place is None]
+        if of_hull:
+            at = np.array([places[k] for k in of_hull])
+            moves = np.array([others[k].hull[i] for k, i in zip(of_hull, at, strict=True)]) - force_model.hull[at]
+            made[:, of_hull] = self.whitening_filter.white(self.steps.hull_changes(force_model, at, moves))
+        if rest:
+            gaps = np.stack([self.steps.gap(others[k]) for k in rest], axis=2)
+            made[:, rest] = self.whitening_filter.white(gaps) - white[:, None]
+        return made
+
     def white(self, force_model: ForceModel) -> Floats:
         """Return the whitened prediction errors of a force model, flat."""
         return self.whitening_filter.white(self.steps.gap(force_model))
@@ -234,6 +252,7 @@ def fit(
     steps: int = MAX_ITERATIONS,
     begin: StartingPoint | None = None,
     least: float = -inf,
+    from_afar: bool = False,
 ) -> Fit:
     """Fit a hypothesis by Gauss-Newton steps on the posterior.
 
@@ -255,6 +274,8 @@ def fit(
     least
         Evidence below which nobody asks: a fit that would stay below it, however far off its linearisation may be
         (`INFERENCE.linearisation_factor`), ends where it is.
+    from_afar
+        True where the slope at the start leads a part of the way only: the first steps are made in any case.
     """
     every = [parameter for candidate in candidates for parameter in candidate.parameters]
     size = np.array([parameter.size for parameter in every])
@@ -330,8 +351,7 @@ def fit(
             moved = np.repeat(z[None], len(free), axis=0)
             moved[np.arange(len(free)), h + free] += d
             there = [moved_from(chain, one, acts[k]) for k, one in zip(free.tolist(), moved, strict=True)]
-            gaps = np.stack([problem.steps.gap(one) for one in there], axis=2)
-            by_effects = (problem.whitening_filter.white(gaps) - w[:, None]) / d
+            by_effects = problem.changes(chain[-1], there, w) / d
         across = by_hull.T @ by_effects
         products[:many, :many], products[:many, many:] = of_hull, across
         products[many:, :many], products[many:, many:] = across.T, by_effects.T @ by_effects
@@ -346,7 +366,8 @@ def fit(
         whole = newton_step(A, slope, lowest, highest)
         promised = -float(2.0 * slope @ whole + whole @ A @ whole)
         # The score test: what the linearisation promises, and a multiple of it as the most that there may be.
-        if least > -inf and evidence_of(cost - promised * INFERENCE.linearisation_factor, A) < least:
+        known = least > -inf and (not from_afar or count >= SEARCHED_STEPS)
+        if known and evidence_of(cost - promised * INFERENCE.linearisation_factor, A) < least:
             break
         for damping in DAMPINGS if promised >= CONVERGED_GAIN else ():
             # Levenberg's and Marquardt's way, where the whole step leads astray.

@@ -38,8 +38,8 @@ LONGEST_STEP = 2.0
 """Longest such step, in a parameter's logarithm."""
 SEARCHED_STEPS = 3
 """Steps of a search before it may be given up: the first ones come from far away."""
-SUFFICIENT_GAIN = 1e-3
-"""Gain in log-likelihood of a step that is worth another."""
+SUFFICIENT_GAIN, SCREENED_GAIN = 1e-3, 0.1
+"""Gain in log-likelihood of a step that is worth another: of a search, and of one that is followed by a search."""
 
 Predictions = tuple[Floats, Floats]
 """Of each of p noises: whitened prediction errors, and the logarithms of their standard deviations, both of shape (p, N)."""
@@ -168,6 +168,7 @@ def fit_noise_with(
         [bounds[k] for k in first_searched],
         most=INFERENCE.screening_iterations,
         wanted=INFERENCE.screening_gain - minimum,
+        sufficient=SCREENED_GAIN,
     )
     if -best > minimum - INFERENCE.screening_gain:
         best, z = _most_likely(predictions, z, bounds)
@@ -214,7 +215,12 @@ def _widths(cost: Callable[[Floats], float], z: Floats, k: int, best: float) -> 
 
 
 def _most_likely(
-    predictions: Predicting, start: Floats, bounds: list[tuple[float, float]], most: int = 60, wanted: float = np.inf
+    predictions: Predicting,
+    start: Floats,
+    bounds: list[tuple[float, float]],
+    most: int = 60,
+    wanted: float = np.inf,
+    sufficient: float = SUFFICIENT_GAIN,
 ) -> tuple[float, Floats]:
     """Return the least cost nearby, minus the logarithm of the likelihood, and its parameters, shape (k,), by Fisher's scoring.
 
@@ -232,6 +238,8 @@ def _most_likely(
     wanted
         Cost above which nobody asks: a search that would stay above it, if each step gained as many times what it promises as
         `INFERENCE.linearisation_factor`, ends where it is.
+    sufficient
+        Gain of a step that is worth another.
     """
     low, high = np.array(bounds).T
     z, damping = np.clip(start, low, high), FIRST_DAMPING
@@ -265,7 +273,7 @@ def _most_likely(
                 damping = max(damping / 10.0, LEAST_DAMPING)
                 break
             damping *= 10.0
-        if gained < SUFFICIENT_GAIN:
+        if gained < sufficient:
             break
     return cost, z
 

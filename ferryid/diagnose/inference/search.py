@@ -275,14 +275,15 @@ def _best_fit(
         start = (*current.values, likeliest_start(problem, linearisation, one) if values is None else values)
         # Where the hull has strained to stand in for an effect that multiplies it, the way to both leads from the profile's.
         from_prior = one.effect.changes_hull and not one.times
+        from_afar = from_prior or one.effect.piecewise
         made = fit(
             problem,
             (*current.candidates, one),
             start,
-            steps=COARSE_ITERATIONS if from_prior or one.effect.piecewise else COMPARING_ITERATIONS,
+            steps=COARSE_ITERATIONS if from_afar else COMPARING_ITERATIONS,
             begin=None if from_prior else begin,
-            # The slope at the start leads a part of the way only, or from far away.
-            least=-inf if from_prior or one.effect.piecewise or one.effect.id in about else current.evidence + least,
+            least=-inf if one.effect.id in about else current.evidence + least,
+            from_afar=from_afar,
         )
         return scored(made)
 

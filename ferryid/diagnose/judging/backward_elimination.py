@@ -72,7 +72,7 @@ def eliminate_backward(
         Called with the name of each stage.
     """
     fallen_by_reason: dict[str, list[str]] = {}
-    tried = {found.keys}
+    tried, judged = {found.keys}, set[frozenset[tuple[object, ...]]]()
     kept, swaps = found, 0
     while kept.candidates:
         standings: tuple[RivalComparison, ...] = ()
@@ -81,16 +81,23 @@ def eliminate_backward(
             standings = _standings(problem, kept, library)
         better = [(i, one) for i, standing in enumerate(standings) for one in standing.rivals[:1] if one.gain > 0.0]
         better = [(i, one) for i, one in better if one.fit.keys not in tried]
-        if better:
+        swapped = None
+        for replaced, best in sorted(better, key=lambda pair: -pair[1].gain):
             # What was selected first may be less likely beside what was selected later than another in its place.
-            replaced, best = max(better, key=lambda pair: pair[1].gain)
             tried.add(best.fit.keys)
             swaps += 1
-            kept = prune(problem, with_both(problem, kept, replaced, best.fit))
-            tried.add(kept.keys)
+            swapped = prune(problem, with_both(problem, kept, replaced, best.fit))
+            tried.add(swapped.keys)
+            # What was judged before would fall again, and lead back here.
+            if _spans(swapped) not in judged and swaps <= JUDGING.most_replacements:
+                break
+            swapped = None
+        if swapped is not None:
+            kept = swapped
             continue
         progress("judging on held-out stretches")
         proof = held_out_evidence(problem, kept)
+        judged.add(_spans(kept))
         fallen, why = _fallen(problem, kept, proof)
         if fallen is None:
             # Where none takes a place any more, rivals are asked for once all stand.
@@ -103,6 +110,11 @@ def eliminate_backward(
         kept = prune(problem, without(problem, kept, fallen))
         tried.add(kept.keys)
     return Elimination(kept, None, (), _told(fallen_by_reason))
+
+
+def _spans(made: Fit) -> frozenset[tuple[object, ...]]:
+    """Return which candidates a fit holds, and when each acts."""
+    return frozenset((*one.key, one.onset_s, one.offset_s) for one in made.candidates)
 
 
 def _standings(problem: EstimationProblem, kept: Fit, library: Sequence[Candidate]) -> tuple[RivalComparison, ...]:

@@ -396,7 +396,7 @@ def _shifted(candidate: Candidate, share: float) -> Candidate:
     def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
         force = _force_of(candidate, force_model, p)
         late = np.roll(force, round(share * len(force)), axis=0)
-        return replace(force_model, external=force_model.external + late)
+        return force_model.replaced(external=force_model.external + late)
 
     return _in_its_place(candidate, apply)
 
@@ -405,8 +405,8 @@ def _mirrored(candidate: Candidate) -> Candidate:
     def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
         measurements = force_model.measurements
         eta = np.column_stack([measurements.eta[:, :2], -measurements.psi])
-        force = _force_of(candidate, replace(force_model, measurements=replace(measurements, eta=eta)), p)
-        return replace(force_model, external=force_model.external + force)
+        force = _force_of(candidate, force_model.replaced(measurements=replace(measurements, eta=eta)), p)
+        return force_model.replaced(external=force_model.external + force)
 
     return _in_its_place(candidate, apply)
 

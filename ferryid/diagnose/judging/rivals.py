@@ -174,7 +174,8 @@ def compare_rivals(problem: EstimationProblem, kept: Fit, index: int, library: S
             steps=COARSE_ITERATIONS,
             begin=None if stand_in.effect.changes_hull else begin,
             # One that is worse than nothing is no rival, whatever it comes to.
-            least=-inf if stand_in.effect.changes_hull or stand_in.effect.piecewise else bare.evidence,
+            least=bare.evidence,
+            from_afar=stand_in.effect.changes_hull or stand_in.effect.piecewise,
         )
         return RivalFit(stand_in, made, made.evidence - kept.evidence)
 
