@@ -75,6 +75,10 @@ class PropertyTest:
         Why it cannot be true of the vessel, or would not be felt, as the end of a sentence; empty where neither is so.
     out_of_step
         Of a delay or lag: what else could put force and motion out of step; None of other properties.
+    logs
+        Size of the campaign; none where all of its logs can show it.
+    hull_known
+        False where the hull comes from the same logs.
     """
 
     candidate: Candidate
@@ -87,6 +91,8 @@ class PropertyTest:
     alike: tuple[str, ...] = ()
     credibility: str = ""
     out_of_step: OutOfStep | None = None
+    logs: int | None = None
+    hull_known: bool = True
 
     @property
     def beyond_feedback(self) -> bool:
@@ -119,6 +125,8 @@ class PropertyTest:
             return "held-out stretches of the logs are not surely predicted better with it"
         if held <= JUDGING.campaign_share * logs:
             return f"only {held} of {counted(logs, 'log')} {verb(held, 'is')} predicted better with it on held-out stretches"
+        if logs == 1 and not self.hull_known:
+            return "one log alone can show it, and the hull comes from the same logs, which may be off in that one"
         if self.credibility:
             return self.credibility
         if harm := worsened(dict(zip(AXES, self.improvement.tolist(), strict=True))):
@@ -138,9 +146,12 @@ class PropertyTest:
         """Return it as a finding on the log of these windows."""
         effect = self.candidate.effect
         says = effect.says({name: one.value for name, one in self.estimates.items()}, self.candidate.instance)
-        held, logs = self.holding
-        says += f" That is estimated from all {counted(logs, 'log')} together; on held-out stretches {held} of them"
-        says += f" {verb(held, 'is')} predicted better with it."
+        held, able = self.holding
+        logs = able if self.logs is None else self.logs
+        says += f" That is estimated from all {counted(logs, 'log')} together; "
+        those = "them" if able == logs else "these"
+        says += f"{able} of them can show it, and " if able < logs else ""
+        says += f"on held-out stretches {held} of {those} {verb(held, 'is')} predicted better with it."
         if not self.confirmed:
             says += f" It is estimated, not confirmed: {self.doubt}."
         gained = np.maximum(self.improvement, 0.0)
@@ -227,6 +238,8 @@ def tested(made: CampaignFit, candidate: Candidate, rivals: Sequence[TriedProper
         tuple(one.candidate.effect.id for one in others if alike(one.candidate, candidate, one.share)),
         _credibility(made, candidate, estimates),
         _out_of_step(made, candidate, without) if effect.out_of_step else None,
+        logs=len(seen),
+        hull_known=made.campaign.hull.known,
     )
 
 

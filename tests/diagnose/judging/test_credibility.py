@@ -403,6 +403,10 @@ def test_a_property_and_a_difference_that_are_not_credible_are_not_confirmed() -
     assert not replace(test, holding=(2, 4)).confirmed
     assert replace(test, holding=(2, 3)).confirmed
     assert replace(test, credibility="nobody has such a thruster").doubt == "nobody has such a thruster"
+    # What one log alone can show is confirmed by no other, beside a hull that may be off in it.
+    assert replace(test, holding=(1, 1), logs=3).confirmed
+    assert replace(test, holding=(1, 1), logs=3, hull_known=False).doubt.startswith("one log alone can show it")
+    assert replace(test, holding=(2, 2), logs=3, hull_known=False).confirmed
     bound = {"factor": replace(estimates["value"], value=2.99, low=2.9, high=3.0)}
     gain = Gain(40.0, 10.0, 70.0)
     apart = replace(Difference.of(weak, bound, 50.0, 0.0, {}), gain=gain, by_group={"A": gain, "B": gain})
