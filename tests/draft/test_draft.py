@@ -406,6 +406,22 @@ def test_a_heading_that_the_motion_does_not_show_is_to_be_checked(tmp_path: Path
     assert "the vessel moves along it" in signals["heading"].evidence[0]
 
 
+@pytest.mark.parametrize(
+    ("name", "told"), [("u", 'fields = ["u"]'), ("speed", 'fields = ["speed"]'), ("depth", "no field")]
+)
+def test_a_draft_without_a_position_and_a_velocity_says_so(tmp_path: Path, name: str, told: str) -> None:
+    columns = sailed()
+    some = {"t": columns["t"], "psi": columns["psi"], name: columns["u"], "speed_setpoint": columns["u"]}
+    draft, signals = drafted(
+        tmp_path, some | {key: columns[key] for key in columns if key.startswith(("rpm", "rudder"))}
+    )
+    assert not {"position", "velocity"} & set(signals)
+    (remark,) = draft.remarks
+    assert remark.startswith("no position and no velocity is mapped, of which a fit needs one")
+    assert told in remark
+    assert any("(no course to compare)" in doubt for doubt in signals["heading"].doubts)
+
+
 def test_columns_that_are_not_mapped_are_listed(tmp_path: Path) -> None:
     made = in_ned(sailed())
     draft, _ = drafted(tmp_path, {**made, "bow_temp": made["t"], "depth": made["u"]})
