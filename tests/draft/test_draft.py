@@ -385,8 +385,15 @@ def test_a_controller_that_ends_turns_does_not_exchange_the_sides(tmp_path: Path
     left[-1], right[-1] = left[-2], right[-2]
     columns = {"t": t, "N": np.cumsum(np.cos(psi)) * 0.1, "E": np.cumsum(np.sin(psi)) * 0.1, "psi": psi, "r": r,
                "left_thrust": left, "right_thrust": right}  # fmt: skip
-    _, signals = drafted(tmp_path, columns)
+    draft, signals = drafted(tmp_path, columns)
     force = next(one for name, one in signals.items() if name.startswith("left."))
+    # On the centre line, as the example of either was, they would turn no vessel.
+    text = draft_text(draft, Answers("boat"))
+    assert [line[:40] for line in text.splitlines() if "position_m" in line] == [
+        "# FILL IN: position_m = [-2.0, -0.5]    ",
+        "# FILL IN: position_m = [-2.0, 0.5]    #",
+    ]
+    assert {one.key: one.hint for one in questions(draft)}["left.y_m"] == "-0.5"
     assert any("turns to starboard" in one for one in force.evidence)
     assert not any("exchanged" in one for one in force.doubts)
     swapped = {**columns, "left_thrust": right, "right_thrust": left}
