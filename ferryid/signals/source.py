@@ -14,6 +14,16 @@ from ferryid.signals.thresholds import SIGNALS
 from ferryid.signals.track import segments
 from ferryid.types import Flags, Floats, Nanoseconds
 
+_TOGETHER = (
+    ("x", "y"),
+    ("u", "v"),
+    ("vel_N", "vel_E"),
+    ("wind_speed", "wind_from"),
+    ("wind_N", "wind_E"),
+    ("current_N", "current_E"),
+)
+"""Signals that are worked on in pairs, at the same times."""
+
 
 @dataclass(frozen=True)
 class Held:
@@ -92,18 +102,22 @@ def sources_of(stream: Stream) -> tuple[Source, ...]:
 def at_own_rates(stream: Stream) -> tuple[Stream, ...]:
     """Return a stream in parts, each of the columns that have their values in the same rows, at the times of these.
 
-    A table that several sensors were merged into has rows in which the slower ones have no value. Where the values of a column
-    are usually farther apart than what counts as a gap of the rows, they would be missing throughout. Other columns stay
-    together, whatever they lack.
+    A table that several sensors were merged into has rows in which others than the one that was read have no value. A column
+    of which two values usually lie two rows apart or more, or farther than what counts as a gap of the rows, is one of these.
+    Other columns stay together, whatever they lack.
     """
     time_s = np.asarray((stream.time_ns - stream.time_ns[:1]) * 1e-9, dtype=np.float64)
-    bridge_s = _bridge(_usual_period(time_s))
+    if time_s.size < 2:
+        return (stream,)
+    least_s = min(_bridge(_usual_period(time_s)), SIGNALS.rows_apart * float(np.median(np.diff(time_s))))
     columns: dict[bytes, list[str]] = {}
     rows: dict[bytes, Flags] = {}
     for name, values in stream.columns.items():
         finite: Flags = np.isfinite(values)
+        for other in next((pair for pair in _TOGETHER if name in pair), ()):
+            finite = finite | np.isfinite(stream.columns.get(other, values))
         times = time_s[finite]
-        apart = not is_load(name) and 1 < times.size < time_s.size and float(np.median(np.diff(times))) > bridge_s
+        apart = not is_load(name) and 1 < times.size < time_s.size and float(np.median(np.diff(times))) >= least_s
         key = finite.tobytes() if apart else b""
         columns.setdefault(key, []).append(name)
         rows.setdefault(key, finite if apart else np.ones(time_s.size, dtype=bool))

@@ -66,6 +66,26 @@ def test_a_position_in_every_tenth_row_is_a_source_of_its_own_rate() -> None:
     assert not any("missing (NaN)" in said for said in one.repairs)
 
 
+def test_sensors_that_were_merged_by_time_are_taken_apart() -> None:
+    """Rows of three sensors in turn, each with the values of one: all but a tenth of each column was said to be missing."""
+    fix_s, boat_s = np.arange(0.003, 60.0, 0.2), np.arange(0.0, 60.0, 0.11)
+    rows_s = np.sort(np.concatenate([fix_s, boat_s, boat_s + 0.004]))
+
+    def at(times: Floats, values: dict[str, Floats]) -> dict[str, Floats]:
+        there = np.isin(rows_s, times)
+        return {name: np.where(there, np.interp(rows_s, times, one), np.nan) for name, one in values.items()}
+
+    every = at(fix_s, place(fix_s)) | at(boat_s, {"psi": heading(boat_s)}) | at(boat_s + 0.004, thrusters(boat_s))
+    # One number of a fix is missing: north and east stay at the same times.
+    every["y"][int(np.flatnonzero(np.isfinite(every["y"]))[7])] = np.nan
+    faults = find_faults(recording(stream("table", rows_s, every)))
+    assert [sorted(one.columns) for one in faults.sources] == [["x", "y"], ["psi"], sorted(thrusters(fix_s))]
+    assert [len(one.time_ns) for one in faults.sources] == [len(fix_s), len(boat_s), len(boat_s)]
+    assert [said for said in faults.taken_out if "missing" in said] == [
+        "y: 1 of 300 samples is missing (NaN); short ones are interpolated."
+    ]
+
+
 def test_fixes_that_fail_are_still_gaps_of_it() -> None:
     track = align(merged(10, skipped=tuple(range(40, 60))), PROFILE)
     assert not track.valid[42:58].any()
