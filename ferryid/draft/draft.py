@@ -10,7 +10,7 @@ from pathlib import Path
 from ferryid.draft.actuator_fields import actuator_fields, constant, parted, shared_topics
 from ferryid.draft.actuators import UNKNOWN_ORDER, DraftedActuator, drafted_actuators
 from ferryid.draft.autopilots import Orders, autopilot_fields, autopilot_groups, changing, orders, with_frames
-from ferryid.draft.fields import FieldGroup, navigation_groups
+from ferryid.draft.fields import ORDERS, FieldGroup, navigation_groups
 from ferryid.draft.guessed_orders import guessed_orders
 from ferryid.draft.kinematics import navigation_signals
 from ferryid.draft.mapped import MappedSignal
@@ -28,6 +28,7 @@ from ferryid.vessel.profile import Profile
 from ferryid.vessel.thrusters import needed_roles
 
 FRAME_ID = "header.frame_id"
+_AHEAD = frozenset({"u", "surge", "speed", "spd", "sog", "stw", "vel", "velocity"})
 
 
 @dataclass(frozen=True)
@@ -163,7 +164,31 @@ def draft_profile(log: str | Path, like: Profile | None = None, ranges: TimeRang
         notes,
         tuple(t.name for t in topics if t.name not in used),
         _left_over([t for t in topics if t.name in used], mapped, {(one.topic, one.path) for one in fields}, like),
-        (*((f"it is no recording of a vessel: {why}",) if (why := simulator(topics)) else ()), *driven.remarks),
+        (
+            *((f"it is no recording of a vessel: {why}",) if (why := simulator(topics)) else ()),
+            *_no_way(every, [topic for topic in topics if topic.name in used or len(topics) == 1]),
+            *driven.remarks,
+        ),
+    )
+
+
+def _no_way(signals: Sequence[MappedSignal], topics: Sequence[Topic]) -> tuple[str, ...]:
+    """Return that nothing is mapped that shows how fast the vessel moves, with what may be a speed of surge alone."""
+    if {"position", "velocity"} & {one.quantity for one in signals}:
+        return ()
+    speeds = [
+        (topic.name, path)
+        for topic in topics
+        for path in topic.fields
+        if set(words_of(path)) & _AHEAD and not set(words_of(path)) & ORDERS
+    ]
+    told = "no position and no velocity is mapped, of which a fit needs one"
+    if not speeds:
+        return (f"{told}, and no field has a name of either",)
+    topic, field = speeds[0]
+    return (
+        f'{told}: if "{field}" is the speed ahead, map it as surge alone, [signals.velocity] with topic = "{topic}", '
+        f'fields = ["{field}"], unit = "m/s" and frame = "FRD"',
     )
 
 

@@ -353,9 +353,10 @@ def _heading(
             f"{abs(course.mean):.2f}): if the vessel moved ahead, add {key} = {value:.3g}"
         )
     else:
+        why = "no course to compare" if pose.position is None else f"mean cosine of course and heading {along:.2f}"
         doubts.append(
-            f"the motion does not show its zero and sign (mean cosine of course and heading {along:.2f}): it has to rise in a "
-            "turn to starboard, and be 0 with the bow north"
+            f"the motion does not show its zero and sign ({why}): it has to rise in a turn to starboard, and be 0 with the bow "
+            "north"
         )
     return MappedSignal(
         "heading", pose.heading.topic, pose.heading.fields, pose.heading_unit, pose.heading_frame, 1.0, (evidence,),

@@ -14,6 +14,7 @@ from ferryid.counts import counted
 from ferryid.draft.actuators import UNKNOWN_ORDER, DraftedActuator
 from ferryid.draft.draft import Draft, as_order
 from ferryid.draft.mapped import MappedSignal
+from ferryid.vessel.field_words import words_of
 from ferryid.vessel.profile import Actuator
 from ferryid.vessel.signal_map import stream_name
 
@@ -205,7 +206,7 @@ def questions(draft: Draft) -> list[Question]:
         if one.name in known:
             continue
         if one.placement.position_m is None:
-            x, y = one.placement.hint_m
+            x, y = _hint(one)
             asked.append(Question(f"{one.name}.x_m", f"{one.name}: metres ahead of midship (negative astern)", f"{x}"))
             asked.append(Question(f"{one.name}.y_m", f"{one.name}: metres to starboard (negative to port)", f"{y}"))
         if one.kind != "force":
@@ -321,12 +322,20 @@ def _wind_load(answers: Answers, length: str | None) -> list[str]:
     return [*lines, f"length_m = {length}", *usual[:-1], f"{usual[-1]}    {note}"]
 
 
+def _hint(one: DraftedActuator) -> tuple[float, float]:
+    """Return an example of a place, on the side that the name states: on the centre line, two thrusters turn no vessel."""
+    x, y = one.placement.hint_m
+    words = set(words_of(one.name))
+    side = bool(words & {"right", "starboard"}) - bool(words & {"left", "port"})
+    return x, y or 0.5 * side
+
+
 def _actuator(one: DraftedActuator, answers: Answers) -> list[str]:
     stated = one.placement
     x, y = _number(answers, f"{one.name}.x_m"), _number(answers, f"{one.name}.y_m")
     if stated.position_m is not None:
         x, y = (f"{value:g}" for value in stated.position_m)
-    hint = ", ".join(f"{value}" for value in stated.hint_m)
+    hint = ", ".join(f"{value}" for value in _hint(one))
     place = (
         f"position_m = [{x}, {y}]"
         if x and y

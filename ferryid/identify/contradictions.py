@@ -49,12 +49,13 @@ def wrong_way(
     )
     if max(-response[axis] for axis in wrong) < IDENTIFY.opposite:
         cause = "the motion hardly follows the applied force at all, rather than going against it"
-        if wrong == [2] and (actuators > 1 or angles):
-            one = "exchanged actuators" if actuators > 1 else "an angle of the wrong sign"
-            cause += f", or {one} with a moment that is several times too large"
         remedy = (
             "check which signal drives which actuator, position_m and angle_deg of each, and the unit of their signals"
         )
+        if wrong == [2] and (actuators > 1 or angles):
+            one = "exchanged actuators" if actuators > 1 else "an angle of the wrong sign"
+            cause += f", or {one} or a heading that counts anticlockwise, with a moment that is several times too large"
+            remedy += ", and the frames of heading and yaw rate"
     elif 0 in wrong:
         cause = "the thrust or the surge velocity has the wrong sign"
         remedy = "change the sign of the thrust curve or of the actuators' signals, or the frame of the velocity"
@@ -88,8 +89,21 @@ def signs_of(profile: Profile) -> tuple[list[str], int, list[tuple[str, str]]]:
     return angles, len(profile.actuators), pairs
 
 
+def orders_alone(profile: Profile) -> bool:
+    """Return whether the forces are those of orders, as no actuator has another signal: what follows them late is unseen."""
+    names = tuple(f"{one.name}." for one in profile.actuators)
+    acting = [one.quantity for one in profile.signals if one.quantity.startswith(names)]
+    return bool(acting) and all(one.endswith(".command") for one in acting)
+
+
 def wrong_size(
-    response: Floats, spread: Floats, share: Floats, profile: str, sigmas: Floats | float = IDENTIFY.wrong_way_sigmas
+    response: Floats,
+    spread: Floats,
+    share: Floats,
+    profile: str,
+    sigmas: Floats | float = IDENTIFY.wrong_way_sigmas,
+    *,
+    orders: bool = False,
 ) -> str:
     """Return what is wrong and how to mend it where the applied force is many times too large or too small; empty where not.
 
@@ -104,6 +118,8 @@ def wrong_size(
         The base model's inertia over the rigid body's on each axis, shape (3,).
     sigmas
         Standard deviations beyond which a response is no chance, shape (3,) or one for all.
+    orders
+        True where the forces are those of orders, which actuators may follow late.
     """
     known = np.isfinite(response)
     reach = (sigmas * spread)[known]
@@ -117,10 +133,13 @@ def wrong_size(
     if small:
         cause = "they are several times too small, or the profile's mass is too large"
     else:
-        cause = "they are several times too large, the actuators were not engaged, or the profile's mass is too small"
+        late = ", or follow their orders late" if orders else ""
+        cause = f"they are several times too large, the actuators were not engaged{late}, or the profile's mass is too small"
     remedy = (
         "correct the unit of the actuators' signals (1 rad/s is 9.55 rpm, 1 kgf 9.81 N), the thrust curve or mass_kg"
     )
+    if orders and not small:
+        remedy += ", or map what the actuators did, if the log has it: within a second a small vessel has answered"
     return f"{told}{cause}. Fix: in {profile}, {remedy}"
 
 

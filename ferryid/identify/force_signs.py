@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ferryid.errors import ReversedForcesError
-from ferryid.identify.contradictions import signs_of, unanswered, wrong_size, wrong_way
+from ferryid.identify.contradictions import orders_alone, signs_of, unanswered, wrong_size, wrong_way
 from ferryid.identify.inertia import relative_inertia, without_inertia
 from ferryid.identify.motion_data import LogData
 from ferryid.identify.split import Split
@@ -210,9 +210,10 @@ def unengaged(responses: Mapping[str, ForceResponse | None], profile: Profile) -
         return {}
     found = {}
     for path, one in without.items():
-        told = wrong_size(one.response, one.spread, one.share, profile.name, one.sigmas).partition(". Fix: ")[0]
+        orders = orders_alone(profile)
+        told = wrong_size(one.response, one.spread, one.share, profile.name, one.sigmas, orders=orders)
         found[path] = (
-            f"{told}. In other logs the vessel follows them. Fix: see whether the actuators were engaged in this log, or "
-            "give it a profile of its own"
+            f"{told.partition('. Fix: ')[0]}. In other logs the vessel follows them. Fix: see whether the actuators were "
+            "engaged in this log, or give it a profile of its own"
         )
     return found

@@ -27,8 +27,10 @@ def skill_checks(scores: ForceScores) -> tuple[Check, ...]:
     with np.errstate(divide="ignore"):
         mean = float(np.exp(np.mean(np.log(ratio))))
     axes = ", ".join(f"{AXES[axis]} {one:.2g}" for axis, one in zip(np.flatnonzero(known), ratio.tolist(), strict=True))
+    # "1 times, and less than 1 is needed" would not say which side of it a ratio lies on.
+    times = next(said for digits in range(2, 18) if (said := f"{mean:.{digits}g}") != "1" or mean == 1.0)
     told = (
-        f"The squared prediction error is {mean:.2g} times that of a velocity that does not change "
+        f"The squared prediction error is {times} times that of a velocity that does not change "
         f"(geometric mean of {axes})"
     )
     if mean < 1.0:

@@ -82,8 +82,9 @@ class MotionData(FitData):
 
     @property
     def where(self) -> str:
-        """Name of the first log, for messages."""
-        return self.motions[0].log
+        """Name of the first log and how many there are beside it, for messages."""
+        more = len(self.motions) - 1
+        return self.motions[0].log + (f" and {more} more" if more else "")
 
     @cached_property
     def training(self) -> QrFactor | CrossProducts:

@@ -16,7 +16,7 @@ from ferryid.effects.hull_spread import default_hull_spread
 from ferryid.errors import FerryIdError
 from ferryid.identify.condition_estimation import OwnConditions, estimate_own
 from ferryid.identify.condition_problem import hull_and_conditions
-from ferryid.identify.contradictions import response_of, signs_of, wrong_size, wrong_way
+from ferryid.identify.contradictions import orders_alone, response_of, signs_of, wrong_size, wrong_way
 from ferryid.identify.feasible import Feasible, LiftTie, feasible_gains
 from ferryid.identify.fit_data import Estimate
 from ferryid.identify.inertia import relative_inertia, without_inertia
@@ -551,7 +551,8 @@ class WeakData(LogData):
         where = f"the profile {self.profile.name}"
         share = relative_inertia(self.profile, self.windows.base_mass)
         against = wrong_way(response, spread, where, *signs_of(self.profile))
-        if told := against or wrong_size(response, spread, share, where):
+        orders = orders_alone(self.profile)
+        if told := against or wrong_size(response, spread, share, where, orders=orders):
             raise FerryIdError(f"{self.where}: {told}")
 
     def feasible(self, gains: Floats, mask: Flags) -> Feasible:

@@ -9,12 +9,13 @@ from pathlib import Path
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 from ferryid.ingest.log import Loss, TableLayout, Topic
-from ferryid.ingest.mat_tables import MatTable, Untimed, from_datenum, tables_of
+from ferryid.ingest.mat_tables import LEAST_SERIES_ROWS, MatTable, Untimed, from_datenum, tables_of
 from ferryid.ingest.mat_variables import MatVariables, read_variables
 from ferryid.ingest.table_time import TimePlan
 from ferryid.ingest.tables import Rows, TableReader, to_ns
 
 _SHOWN_NAMES = 6
+_CELL_REMEDY = "save what belongs together as a structure per run, as in run1 = struct('t', ..., 'u', {name}{{1}})"
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,8 @@ def open_mat(path: Path, layout: TableLayout | None) -> TableReader:
     tables, untimed = tables_of(variables.found, layout)
     if not tables:
         raise FerryIdError(f"{path}: {_without(variables, layout)}")
-    losses = [*variables.losses, *_objects(path, variables), *(_not_read(path, one, layout) for one in untimed)]
+    losses = [*variables.losses, *_objects(path, variables), *_cells(path, variables)]
+    losses += [_not_read(path, one, layout) for one in untimed]
     return TableReader([_sheet(path, table) for table in tables], losses)
 
 
@@ -51,6 +53,15 @@ def _objects(path: Path, variables: MatVariables) -> list[Loss]:
             f"{name} is a {kind} object of MATLAB, which only MATLAB reads. Fix: in MATLAB, {_remedy(name, kind)}",
         )
         for name, kind in variables.objects.items()
+    ]
+
+
+def _cells(path: Path, variables: MatVariables) -> list[Loss]:
+    """Return cell arrays that hold as many numbers as a signal has."""
+    return [
+        Loss(str(path), f"{name} is a cell array, which is not read. Fix: in MATLAB, {_CELL_REMEDY.format(name=name)}")
+        for name, most in variables.cells.items()
+        if most >= LEAST_SERIES_ROWS
     ]
 
 
@@ -98,6 +109,13 @@ def _without(variables: MatVariables, layout: TableLayout | None) -> str:
         return (
             f"{counted(count, 'object')} of MATLAB ({name}: {kind}{', ...' if count > 1 else ''}), which only MATLAB reads, "
             f"and no other time series. Fix: in MATLAB, {_remedy(name, kind)}"
+        )
+    if variables.cells:
+        names = list(variables.cells)
+        shown = ", ".join(names[:_SHOWN_NAMES]) + (", ..." if len(names) > _SHOWN_NAMES else "")
+        return (
+            f"{counted(len(names), 'cell array')} ({shown}), which are not read, and no other time series. Fix: in MATLAB, "
+            f"{_CELL_REMEDY.format(name=names[0])}"
         )
     if variables.losses and not variables.found:
         return f"{variables.losses[0].what}. Fix: copy it again, or save it again in MATLAB"

@@ -51,12 +51,15 @@ class MatVariables:
         True where the file is a saved figure.
     losses
         Variables that cannot be read.
+    cells
+        Cell arrays of something else than texts, and the most numbers in a cell of each: they are not read.
     """
 
     found: dict[str, Node] = field(default_factory=dict)
     objects: dict[str, str] = field(default_factory=dict)
     figure: bool = False
     losses: list[Loss] = field(default_factory=list)
+    cells: dict[str, int] = field(default_factory=dict)
 
 
 def read_variables(path: Path) -> MatVariables:
@@ -272,7 +275,10 @@ def _node(value: Any, path: str, result: MatVariables, depth: int) -> Node | Non
     if value.dtype.names:
         return _structure(value, path, result, depth)
     if value.dtype.kind == "O":
-        return _texts(value)
+        words = _texts(value)
+        if words is None and (most := _most_numbers(value)):
+            result.cells[path] = most
+        return words
     if value.dtype.kind == "U":
         texts = np.array([str(value.flat[0]) if value.size == 1 else "".join(value.ravel().tolist())], object)
         return Leaf((1,), "O", "string", lambda: texts)
@@ -324,6 +330,19 @@ def _few(value: Any) -> list[tuple[int, Any]]:
 
 def _constant(array: Column) -> Callable[[], Column]:
     return lambda: array
+
+
+def _most_numbers(value: Any) -> int:
+    """Return the size of the largest array in a cell array, one that stands in a structure there among them."""
+    sizes = [0]
+    for cell in value.flat:
+        inner = (
+            [one for name in cell.dtype.names for one in cell[name].flat]
+            if getattr(cell.dtype, "names", None)
+            else [cell]
+        )
+        sizes += [one.size for one in inner if isinstance(one, np.ndarray) and one.dtype.kind in "fiub"]
+    return max(sizes)
 
 
 def _texts(value: Any) -> Leaf | None:

@@ -9,7 +9,7 @@ import numpy as np
 from ferryid.signals.pose_limits import Samples
 from ferryid.signals.poses import USED, PoseFault, pose_faults, pose_reason, pose_sentences
 from ferryid.signals.quality import is_load
-from ferryid.signals.source import Held, Source, source_of
+from ferryid.signals.source import Held, Source, sources_of
 from ferryid.signals.stream import Recording, Stream
 from ferryid.signals.thresholds import SIGNALS
 from ferryid.signals.velocities import held_reason, held_sentences, held_velocities
@@ -62,7 +62,7 @@ class Faults:
 
 def find_faults(recording: Recording) -> Faults:
     """Clean every stream of a recording, and find poses that cannot be true and velocities that stay at one value."""
-    sources = [source_of(stream) for stream in recording.streams.values() if _enough(stream)]
+    sources = [one for stream in recording.streams.values() if _enough(stream) for one in sources_of(stream)]
     samples: Samples = {name: (s.time_ns, s.columns[name]) for s in sources for name in USED if name in s.columns}
     poses = pose_faults(samples)
     velocities = held_velocities(samples, poses)

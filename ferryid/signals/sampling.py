@@ -11,12 +11,14 @@ import numpy as np
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 from ferryid.signals.quality import NAVIGATION, is_actuator, is_order
+from ferryid.signals.source import at_own_rates
 from ferryid.signals.stream import Recording, Stream
 from ferryid.signals.thresholds import SIGNALS
 from ferryid.vessel.profile import Profile
 
 GRAVITY = 9.81
 _LEAD = ("u", "vel_N", "x", "psi")
+_RECORD_FASTER = "record the navigation at a higher rate"
 _UNITS = (("ms", "milliseconds", 1e3), ("us", "microseconds", 1e6), ("ns", "nanoseconds", 1e9))
 
 
@@ -30,17 +32,20 @@ def check_sampling(recording: Recording, profile: Profile) -> None:
     """
     check_advancing(recording)
     navigation = [stream for stream in recording.streams.values() if set(stream.columns) & set(NAVIGATION)]
-    lead = next((one for name in _LEAD for one in navigation if name in one.columns and len(one.time_ns) > 1), None)
+    parts = [one for stream in navigation if len(stream.time_ns) > 1 for one in at_own_rates(stream)]
+    leads = ((name, one) for name in _LEAD for one in parts if name in one.columns and len(one.time_ns) > 1)
+    name, lead = next(leads, ("", None))
     if lead is None:
         return
     period_s = float(np.median(np.diff(lead.time_ns))) * 1e-9
     length_m = _length(profile)
     if period_s <= SIGNALS.slowest_period * sqrt(length_m / GRAVITY):
         return
+    in_each_row = len(lead.time_ns) == len(recording.streams[lead.topic].time_ns)
     raise FerryIdError(
-        f"{_file(recording)}: the motion is sampled too slowly for a fit, found a row of {lead.topic} every "
-        f"{period_s:.4g} s, where a vessel of {length_m:.3g} m needs at least {_least_hz(length_m):.2g} Hz. "
-        f"Fix: {_remedy(recording, lead, period_s)}"
+        f"{_file(recording)}: the motion is sampled too slowly for a fit, found {'a row' if in_each_row else name} of "
+        f"{lead.topic} every {period_s:.4g} s, where a vessel of {length_m:.3g} m needs at least "
+        f"{_least_hz(length_m):.2g} Hz. Fix: {_remedy(recording, lead, period_s) if in_each_row else _RECORD_FASTER}"
     )
 
 
@@ -95,9 +100,9 @@ def _remedy(recording: Recording, lead: Stream, period_s: float) -> str:
             if SIGNALS.lowest_usual_hz <= scale / period_s <= SIGNALS.highest_usual_hz:
                 setting = f'set time_unit = "{unit}" under [table] in the profile'
                 if period_s < SIGNALS.unit_period_s:
-                    return f"record the navigation at a higher rate, or {setting} if these are {name}"
+                    return f"{_RECORD_FASTER}, or {setting} if these are {name}"
                 return f"these look like {name}, so {setting}"
-    return "record the navigation at a higher rate"
+    return _RECORD_FASTER
 
 
 def _standing(recording: Recording, streams: Sequence[Stream]) -> str:

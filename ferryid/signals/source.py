@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +13,16 @@ from ferryid.signals.stream import Stream
 from ferryid.signals.thresholds import SIGNALS
 from ferryid.signals.track import segments
 from ferryid.types import Flags, Floats, Nanoseconds
+
+_TOGETHER = (
+    ("x", "y"),
+    ("u", "v"),
+    ("vel_N", "vel_E"),
+    ("wind_speed", "wind_from"),
+    ("wind_N", "wind_E"),
+    ("current_N", "current_E"),
+)
+"""Signals that are worked on in pairs, at the same times."""
 
 
 @dataclass(frozen=True)
@@ -73,12 +83,63 @@ class Source:
     remarks: tuple[str, ...] = ()
 
 
+def sources_of(stream: Stream) -> tuple[Source, ...]:
+    """Clean a stream: one source, and more where columns have values at rates of their own; see `at_own_rates`."""
+    sources = []
+    for part in at_own_rates(stream):
+        source = source_of(part)
+        if part.time_ns.size < stream.time_ns.size:
+            said = (
+                f"{stream.topic}: {', '.join(part.columns)} {'has' if len(part.columns) == 1 else 'have'} a value in "
+                f"{part.time_ns.size} of {counted(stream.time_ns.size, 'row')}, "
+                f"every {source.period_s:.3g} s: taken as measured at that rate."
+            )
+            source = replace(source, remarks=(said, *source.remarks))
+        sources.append(source)
+    return tuple(sources)
+
+
+def at_own_rates(stream: Stream) -> tuple[Stream, ...]:
+    """Return a stream in parts, each of the columns that have their values in the same rows, at the times of these.
+
+    A table that several sensors were merged into has rows in which others than the one that was read have no value. A column
+    of which two values usually lie two rows apart or more, or farther than what counts as a gap of the rows, is one of these.
+    Other columns stay together, whatever they lack.
+    """
+    time_s = np.asarray((stream.time_ns - stream.time_ns[:1]) * 1e-9, dtype=np.float64)
+    if time_s.size < 2:
+        return (stream,)
+    least_s = min(_bridge(_usual_period(time_s)), SIGNALS.rows_apart * float(np.median(np.diff(time_s))))
+    columns: dict[bytes, list[str]] = {}
+    rows: dict[bytes, Flags] = {}
+    for name, values in stream.columns.items():
+        finite: Flags = np.isfinite(values)
+        for other in next((pair for pair in _TOGETHER if name in pair), ()):
+            finite = finite | np.isfinite(stream.columns.get(other, values))
+        times = time_s[finite]
+        apart = not is_load(name) and 1 < times.size < time_s.size and float(np.median(np.diff(times))) >= least_s
+        key = finite.tobytes() if apart else b""
+        columns.setdefault(key, []).append(name)
+        rows.setdefault(key, finite if apart else np.ones(time_s.size, dtype=bool))
+    if list(columns) in ([], [b""]):
+        return (stream,)
+    return tuple(
+        replace(
+            stream,
+            time_ns=stream.time_ns[rows[key]],
+            columns={name: stream.columns[name][rows[key]] for name in names},
+            receive_ns=stream.receive_ns[rows[key]],
+        )
+        for key, names in columns.items()
+    )
+
+
 def source_of(stream: Stream) -> Source:
     """Take implausible, stale and stuck samples out of a stream, and find what counts as a gap in it."""
     time_ns = np.asarray(stream.time_ns)
     time_s = (time_ns - time_ns[0]) * 1e-9
     period = _usual_period(time_s)
-    bridge = max(SIGNALS.gap_periods * period, SIGNALS.gap_s)
+    bridge = _bridge(period)
     columns: dict[str, Floats] = {}
     taken_out: list[str] = []
     remarks: list[str] = []
@@ -135,6 +196,11 @@ def _stretches(signals: tuple[str, ...], time_ns: Nanoseconds, wrong: Flags, rea
     ]
 
 
+def _bridge(period_s: float) -> float:
+    """Return the longest interval [s] that is interpolated in a stream of this usual period."""
+    return max(SIGNALS.gap_periods * period_s, SIGNALS.gap_s)
+
+
 def _usual_period(time_s: Floats) -> float:
     """Return the mean interval [s] of a stream without its gaps.
 
@@ -146,7 +212,7 @@ def _usual_period(time_s: Floats) -> float:
         return 1.0
     period = float(interval.mean())
     for _ in range(5):
-        within = interval <= max(SIGNALS.gap_periods * period, SIGNALS.gap_s)
+        within = interval <= _bridge(period)
         if not within.any():
             break
         shorter = float(interval[within].mean())

@@ -20,6 +20,12 @@ class SignalThresholds:
         "convention: one or two messages may be lost",
     )
     gap_s: float = threshold(0.5, "s", "shortest gap", "convention: a vessel's velocity changes little meanwhile")
+    rows_apart: float = threshold(
+        1.75,
+        "rows",
+        "usual distance of the values of a column of a table from which the rows between are other sensors'",
+        "derived: two rows, less what times jitter by",
+    )
     stuck_periods: float = threshold(
         10.0,
         "periods",

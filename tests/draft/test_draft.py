@@ -385,8 +385,15 @@ def test_a_controller_that_ends_turns_does_not_exchange_the_sides(tmp_path: Path
     left[-1], right[-1] = left[-2], right[-2]
     columns = {"t": t, "N": np.cumsum(np.cos(psi)) * 0.1, "E": np.cumsum(np.sin(psi)) * 0.1, "psi": psi, "r": r,
                "left_thrust": left, "right_thrust": right}  # fmt: skip
-    _, signals = drafted(tmp_path, columns)
+    draft, signals = drafted(tmp_path, columns)
     force = next(one for name, one in signals.items() if name.startswith("left."))
+    # On the centre line, as the example of either was, they would turn no vessel.
+    text = draft_text(draft, Answers("boat"))
+    assert [line[:40] for line in text.splitlines() if "position_m" in line] == [
+        "# FILL IN: position_m = [-2.0, -0.5]    ",
+        "# FILL IN: position_m = [-2.0, 0.5]    #",
+    ]
+    assert {one.key: one.hint for one in questions(draft)}["left.y_m"] == "-0.5"
     assert any("turns to starboard" in one for one in force.evidence)
     assert not any("exchanged" in one for one in force.doubts)
     swapped = {**columns, "left_thrust": right, "right_thrust": left}
@@ -404,6 +411,22 @@ def test_a_heading_that_the_motion_does_not_show_is_to_be_checked(tmp_path: Path
     assert "moves along" not in signals["heading"].evidence[0]
     _, signals = drafted(tmp_path, {**columns, "heading": np.degrees(made["psi"]) % 360.0})
     assert "the vessel moves along it" in signals["heading"].evidence[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "told"), [("u", 'fields = ["u"]'), ("speed", 'fields = ["speed"]'), ("depth", "no field")]
+)
+def test_a_draft_without_a_position_and_a_velocity_says_so(tmp_path: Path, name: str, told: str) -> None:
+    columns = sailed()
+    some = {"t": columns["t"], "psi": columns["psi"], name: columns["u"], "speed_setpoint": columns["u"]}
+    draft, signals = drafted(
+        tmp_path, some | {key: columns[key] for key in columns if key.startswith(("rpm", "rudder"))}
+    )
+    assert not {"position", "velocity"} & set(signals)
+    (remark,) = draft.remarks
+    assert remark.startswith("no position and no velocity is mapped, of which a fit needs one")
+    assert told in remark
+    assert any("(no course to compare)" in doubt for doubt in signals["heading"].doubts)
 
 
 def test_columns_that_are_not_mapped_are_listed(tmp_path: Path) -> None:

@@ -254,6 +254,10 @@ def test_a_model_is_held_against_a_velocity_that_does_not_change() -> None:
         "is 1.3 times that of a velocity that does not change (geometric mean of surge 0.5, sway 2, yaw 2)"
         in bad.reason
     )
+    (near,) = judged(1.0, 1.0, 0.889)
+    assert "is 1.04 times that of a velocity that does not change" in near.reason
+    (nearly,) = judged(1.0, 1.0, 1.01)
+    assert "is 0.997 times that of a velocity that does not change" in nearly.reason
     (even,) = judged(1.0, 1.0, 1.0)
     assert even.value == pytest.approx(1.0), "half of one is as much as twice of another"
     (without_sway,) = judged(1.0, np.nan, 2.0)

@@ -18,7 +18,7 @@ from ferryid.errors import FerryIdError
 from ferryid.identify import estimators, inputs
 from ferryid.identify import feasible as feasible_module
 from ferryid.identify import physical_checks as physical_checks_module
-from ferryid.identify.contradictions import wrong_way
+from ferryid.identify.contradictions import orders_alone, wrong_size, wrong_way
 from ferryid.identify.estimation import estimate_correction
 from ferryid.identify.feasible import Feasible, _nearest, feasible_gains
 from ferryid.identify.inertia import relative_inertia
@@ -38,6 +38,7 @@ from ferryid.signals.prepare import Opened, open_track
 from ferryid.signals.smooth import smooth_measured
 from ferryid.signals.track import Motion
 from ferryid.types import RunContext, no_progress
+from ferryid.vessel import load_profile
 from ferryid.vessel.profile import Profile
 from tests.identify.rounds import PROFILE, RATE_HZ, motion
 from tests.identify.trials import measured
@@ -452,9 +453,21 @@ def test_forces_that_are_hardly_followed_are_not_taken_for_reversed_ones() -> No
     assert "opposite sides" not in said
     assert "exchanged" not in said
     alone = wrong_way(np.array([np.nan, np.nan, -0.05]), spread, "the profile boat")
-    assert "or exchanged actuators with a moment that is several times too large" in alone
+    assert "or exchanged actuators or a heading that counts anticlockwise, with a moment that is several times" in alone
+    assert "and the unit of their signals, and the frames of heading and yaw rate" in alone
     assert "opposite sides" in wrong_way(np.array([0.9, -0.3, 0.8]), spread, "the profile boat")
     assert wrong_way(np.array([0.008, -0.03, 0.5]), spread, "the profile boat") == ""
+
+
+def test_orders_that_are_followed_late_may_be_why_forces_are_hardly_followed() -> None:
+    """A boat that answers its orders within a second was refused for a wrong unit of its thrust."""
+    response, spread, share = np.array([0.09, np.nan, 0.16]), np.full(3, 0.01), np.ones(3)
+    said = wrong_size(response, spread, share, "boat", orders=True)
+    assert "the actuators were not engaged, or follow their orders late, or the profile's mass is too small" in said
+    assert "map what the actuators did" in said
+    assert "late" not in wrong_size(response, spread, share, "boat")
+    assert "late" not in wrong_size(3.0 / IDENTIFY.least_inertia * share, spread, share, "boat", orders=True)
+    assert [orders_alone(load_profile(name)) for name in ("gunnerus", "milliampere", "vtec-usv")] == [True, False, True]
 
 
 @pytest.mark.slow

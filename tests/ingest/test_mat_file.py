@@ -30,6 +30,12 @@ def saved(folder: Path, variables: dict[str, Any], **options: Any) -> Path:
     return folder / "log.mat"
 
 
+def _cells(*values: Any) -> Any:
+    cells = np.empty(len(values), object)
+    cells[:] = values
+    return cells
+
+
 def as_hdf5(folder: Path, variables: dict[str, Any]) -> Path:
     """Write the way MATLAB does with -v7.3: axes reversed, classes as attributes, a block of 512 bytes in front."""
 
@@ -227,6 +233,10 @@ def test_a_length_that_swallows_the_next_variable_is_told_and_costs_nothing(tmp_
         ({"hgS_070000": {"type": "figure", "x": T}}, "a figure of MATLAB.*save the data"),
         ({"A": np.eye(4), "b": np.ones((4, 1)), "name": "boat"}, "looks like a time.*found A, b, name"),
         ({"t": T}, "looks like a time"),
+        (
+            {"times": _cells(T, T[:9]), "speeds": _cells(U, U[:9]), "gain": 2.0},
+            r"2 cell arrays \(times, speeds\), which are not read, .*struct\('t', \.\.\., 'u', times\{1\}\)",
+        ),
         ({}, "looks like a time.*found nothing"),
     ],
 )
@@ -234,6 +244,13 @@ def test_what_is_no_time_series_is_one_line(tmp_path: Path, variables: dict[str,
     with pytest.raises(FerryIdError, match=found) as caught:
         open_log(saved(tmp_path, variables))
     assert "Fix: " in str(caught.value)
+
+
+def test_cell_arrays_of_signals_beside_a_time_series_are_listed_as_lost(tmp_path: Path) -> None:
+    long = np.arange(60.0)
+    cells = {"runs": _cells({"t": long, "u": long}, "a note"), "names": _cells("a", "b"), "gains": _cells(T[:3], 2.0)}
+    (loss,) = open_log(saved(tmp_path, {"t": T, "u": U, **cells})).losses
+    assert loss.what.startswith("runs is a cell array, which is not read. Fix: in MATLAB, save ")
 
 
 def test_a_figure_is_known_by_its_content(tmp_path: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence, Set
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import exp, inf
 
@@ -26,7 +26,7 @@ from ferryid.diagnose.judging.experiment_design import manoeuvre
 from ferryid.diagnose.judging.finding import Finding, Rival
 from ferryid.diagnose.judging.rivals import alike, redundant_shape
 from ferryid.diagnose.judging.thresholds import JUDGING
-from ferryid.effects.effect import HELD
+from ferryid.effects.effect import HELD, Parameter
 from ferryid.effects.wording import weak_evidence
 from ferryid.side_by_side import over
 from ferryid.types import AXES, Floats
@@ -75,6 +75,10 @@ class PropertyTest:
         Why it cannot be true of the vessel, or would not be felt, as the end of a sentence; empty where neither is so.
     out_of_step
         Of a delay or lag: what else could put force and motion out of step; None of other properties.
+    logs
+        Size of the campaign; none where all of its logs can show it.
+    hull_known
+        False where the hull comes from the same logs.
     """
 
     candidate: Candidate
@@ -87,6 +91,8 @@ class PropertyTest:
     alike: tuple[str, ...] = ()
     credibility: str = ""
     out_of_step: OutOfStep | None = None
+    logs: int | None = None
+    hull_known: bool = True
 
     @property
     def beyond_feedback(self) -> bool:
@@ -119,6 +125,8 @@ class PropertyTest:
             return "held-out stretches of the logs are not surely predicted better with it"
         if held <= JUDGING.campaign_share * logs:
             return f"only {held} of {counted(logs, 'log')} {verb(held, 'is')} predicted better with it on held-out stretches"
+        if logs == 1 and not self.hull_known:
+            return "one log alone can show it, and the hull comes from the same logs, which may be off in that one"
         if self.credibility:
             return self.credibility
         if harm := worsened(dict(zip(AXES, self.improvement.tolist(), strict=True))):
@@ -138,9 +146,12 @@ class PropertyTest:
         """Return it as a finding on the log of these windows."""
         effect = self.candidate.effect
         says = effect.says({name: one.value for name, one in self.estimates.items()}, self.candidate.instance)
-        held, logs = self.holding
-        says += f" That is estimated from all {counted(logs, 'log')} together; on held-out stretches {held} of them"
-        says += f" {verb(held, 'is')} predicted better with it."
+        held, able = self.holding
+        logs = able if self.logs is None else self.logs
+        says += f" That is estimated from all {counted(logs, 'log')} together; "
+        those = "them" if able == logs else "these"
+        says += f"{able} of them can show it, and " if able < logs else ""
+        says += f"on held-out stretches {held} of {those} {verb(held, 'is')} predicted better with it."
         if not self.confirmed:
             says += f" It is estimated, not confirmed: {self.doubt}."
         gained = np.maximum(self.improvement, 0.0)
@@ -209,7 +220,7 @@ def tested(made: CampaignFit, candidate: Candidate, rivals: Sequence[TriedProper
     value, error = _estimate(made, candidate)
     unreported = frozenset.intersection(*(effect.unreported(one, value) for one in seen))
     estimates = {
-        one.name: Estimate.normal(float(at), float(e), one.unit)
+        one.name: within_possible(one, float(at), float(e))
         for one, at, e in zip(candidate.parameters, value, error, strict=True)
         if one.name not in unreported and one.size > HELD
     }
@@ -227,7 +238,15 @@ def tested(made: CampaignFit, candidate: Candidate, rivals: Sequence[TriedProper
         tuple(one.candidate.effect.id for one in others if alike(one.candidate, candidate, one.share)),
         _credibility(made, candidate, estimates),
         _out_of_step(made, candidate, without) if effect.out_of_step else None,
+        logs=len(seen),
+        hull_known=made.campaign.hull.known,
     )
+
+
+def within_possible(parameter: Parameter, value: float, error: float) -> Estimate:
+    """Return an estimate whose interval ends where its parameter does, as of a single log: no time constant is negative."""
+    made = Estimate.normal(value, error, parameter.unit)
+    return replace(made, low=min(value, max(made.low, parameter.low)), high=max(value, min(made.high, parameter.high)))
 
 
 def _out_of_step(made: CampaignFit, candidate: Candidate, without: CampaignFit) -> OutOfStep:

@@ -290,17 +290,23 @@ def unexplained_shares(context: Context) -> dict[str, float]:
     return {axis: max(0.0, *(one.improvement[axis] if described else 1.0 for one in slow)) for axis in AXES if slow}
 
 
+def _one_log_at_most(log: LogFigures) -> bool:
+    """Return whether the hull comes from the log itself and one other at most."""
+    return not log.joint or 0 < len(log.campaign) < JUDGING.campaign_logs
+
+
 @rule(of_name=True)
 def hull_from_this_log(finding: Finding, context: Context, _threshold: float) -> Outcome:
     """Lower forces where the hull is known from nothing but the log that shows them.
 
-    A hull that a campaign's other logs speak for is known as far as forces go; what a disturbance shakes is still guessed at,
-    and may be its measurement. What sets in within the log is known by that: no hull changes from one moment to the next. What
+    A hull that a campaign's other logs speak for is known as far as forces go, but not by one other log: the two may be off
+    from each other in their manoeuvres, and nothing shows in which. What a disturbance shakes is still guessed at, and may be
+    its measurement. What sets in within the log is known by that: no hull changes from one moment to the next. What
     acts all along is, where it stands out against every force that the motion decides.
     """
     if context.own.sets_in or context.own.beyond_hull:
         return finding, ""
-    guessed = {"force": not context.log.joint, "disturbance": True}.get(context.own.kind, False)
+    guessed = {"force": _one_log_at_most(context.log), "disturbance": True}.get(context.own.kind, False)
     if context.log.hull_known or not guessed:
         return finding, ""
     return lowered(finding, "hull_parameters", manoeuvre=fitting(HULL_FIRST, context.log.circumstances)), ""
@@ -538,10 +544,11 @@ def predictive(claims: Sequence[Claim], log: LogFigures) -> frozenset[Key]:
 def log_notes(log: LogFigures) -> list[str]:
     """Return what lowers every finding of a log alike, and what to record instead, as sentences."""
     notes = []
-    if not log.hull_known and not log.joint:
+    if not log.hull_known and _one_log_at_most(log):
+        fitted_to = "this log and one other" if log.joint else "this log"
         notes.append(
-            "The profile has no hull model, or one of unknown spread: damping and added mass were fitted to this log beside "
-            "the findings, which can stand in for what a hull model would explain. Take them as hints, of probability "
+            f"The profile has no hull model, or one of unknown spread: damping and added mass were fitted to {fitted_to} "
+            "beside the findings, which can stand in for what a hull model would explain. Take them as hints, of probability "
             f"{JUDGING.hint_probability:g} at most, but for what stands out: what sets in within the log, or what no force "
             "of the motion explains."
         )

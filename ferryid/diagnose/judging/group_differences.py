@@ -160,7 +160,24 @@ def judged_difference(made: CampaignFit, candidate: Candidate, contenders: Seque
         circumstances=Circumstances.of(profile),
     )
     doubt = _doubt(found, candidate.effect, made.campaign.hull.known, profile)
-    return replace(found, doubt=doubt or _surpassed(contenders, made.disagreement))
+    return replace(found, doubt=doubt or _surpassed(contenders, made.disagreement) or _of_regimes(made.campaign))
+
+
+def _of_regimes(campaign: Campaign) -> str:
+    """Return that nothing separates two logs that moved unlike from a hull that is off, as the end of a sentence; empty where
+    something does.
+
+    A hull that comes from the same two logs is that of two regimes, and what it is off between them is one difference. Further
+    logs of a group show by how much it scatters.
+    """
+    if campaign.hull.known or scatter_shows(campaign):
+        return ""
+    axes = [one.axis for one in _regimes(campaign)]
+    return (
+        f"the hull comes from the same two logs, which moved unlike in {listed(axes)}, and may be off between such motions"
+        if axes
+        else ""
+    )
 
 
 def _surpassed(contenders: Sequence[Contender], apart: float) -> str:
@@ -237,15 +254,35 @@ def notes_of(judged: JudgedGroups, campaign: Campaign) -> tuple[str, ...]:
         )
     for one in judged.shared:
         found.append(f"{one.title} was estimated beside the differences as a property of both groups.")
-    found += _regimes(campaign)
+    found += [one.says for one in _regimes(campaign)]
     return tuple(found)
 
 
-def _regimes(campaign: Campaign) -> list[str]:
-    """Return for each axis on which the groups moved unlike, that they did."""
-    names = (("surge", "m/s"), ("sway", "m/s"), ("yaw", "deg/s"))
+@dataclass(frozen=True)
+class _Regimes:
+    """An axis on which the groups moved unlike: the share of B's velocities within the range of A's, and that range."""
+
+    axis: str
+    unit: str
+    share: float
+    low: float
+    high: float
+
+    @property
+    def says(self) -> str:
+        """Return it as a sentence."""
+        return (
+            f"Only {100.0 * self.share:.0f} % of the {self.axis} velocity of group B lies within that of group A "
+            f"({self.low:.2f} to {self.high:.2f} {self.unit}): where the hull model is off, that appears as a difference."
+        )
+
+
+def _regimes(campaign: Campaign) -> list[_Regimes]:
+    """Return the axes on which the groups moved unlike."""
     found = []
-    for k, (axis, unit) in enumerate(names):
+    for k, (axis, unit, scale) in enumerate(
+        (("surge", "m/s", 1.0), ("sway", "m/s", 1.0), ("yaw", "deg/s", 180.0 / np.pi))
+    ):
         rows = {
             group: np.concatenate(
                 [
@@ -256,14 +293,10 @@ def _regimes(campaign: Campaign) -> list[str]:
             )
             for group in GROUPS
         }
-        low, high = np.quantile(rows[GROUPS[0]], [0.025, 0.975])
+        low, high = np.quantile(rows[GROUPS[0]], [0.025, 0.975]).tolist()
         share = float(np.mean((rows[GROUPS[1]] >= low) & (rows[GROUPS[1]] <= high)))
         if share < JUDGING.common_regime:
-            scale = 180.0 / np.pi if axis == "yaw" else 1.0
-            found.append(
-                f"Only {100.0 * share:.0f} % of the {axis} velocity of group B lies within that of group A "
-                f"({scale * low:.2f} to {scale * high:.2f} {unit}): where the hull model is off, that appears as a difference."
-            )
+            found.append(_Regimes(axis, unit, share, scale * low, scale * high))
     return found
 
 

@@ -386,6 +386,18 @@ def test_what_all_logs_do_not_confirm_is_no_property_of_one(logs: int, weighed: 
     assert stands(not_of_all_logs, found("wind"), Context(Figures("force"), figures))
 
 
+@pytest.mark.parametrize(("logs", "known", "sure"), [(2, False, False), (3, False, True), (2, True, True)])
+def test_a_force_beside_the_hull_of_one_other_log_is_a_hint(logs: int, known: bool, sure: bool) -> None:
+    figures = LogFigures(hull_known=known, joint=True, campaign=(frozenset[tuple[str, str | None]](),) * logs)
+    assert stands(hull_from_this_log, found("payload"), Context(Figures("force"), figures)) == sure
+    # What sets in stands out against any hull, and what all logs share is judged with them.
+    assert stands(hull_from_this_log, found("payload"), Context(Figures("force", sets_in=True), figures))
+    assert stands(hull_from_this_log, found("payload"), Context(Figures("property"), figures))
+    notes = log_notes(figures)
+    assert (not notes) == sure
+    assert sure or "fitted to this log and one other beside the findings" in notes[0]
+
+
 def test_a_weak_thruster_in_a_part_of_one_log_is_no_event_where_the_logs_bring_the_hull() -> None:
     weak = replace(found("thruster_gain"), onset_s=6.0)
     joint = LogFigures(hull_known=False, joint=True)

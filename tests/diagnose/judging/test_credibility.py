@@ -17,7 +17,7 @@ from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging import campaign_properties, conclude
 from ferryid.diagnose.judging.campaign_conditions import ConditionTest
 from ferryid.diagnose.judging.campaign_evidence import Gain, HeldOutLoss
-from ferryid.diagnose.judging.campaign_properties import PropertyTest
+from ferryid.diagnose.judging.campaign_properties import PropertyTest, within_possible
 from ferryid.diagnose.judging.claims import Claim, Figures, Kind, LogFigures
 from ferryid.diagnose.judging.confidence_rules import apply_rules
 from ferryid.diagnose.judging.credibility import (
@@ -403,10 +403,23 @@ def test_a_property_and_a_difference_that_are_not_credible_are_not_confirmed() -
     assert not replace(test, holding=(2, 4)).confirmed
     assert replace(test, holding=(2, 3)).confirmed
     assert replace(test, credibility="nobody has such a thruster").doubt == "nobody has such a thruster"
+    # What one log alone can show is confirmed by no other, beside a hull that may be off in it.
+    assert replace(test, holding=(1, 1), logs=3).confirmed
+    assert replace(test, holding=(1, 1), logs=3, hull_known=False).doubt.startswith("one log alone can show it")
+    assert replace(test, holding=(2, 2), logs=3, hull_known=False).confirmed
     bound = {"factor": replace(estimates["value"], value=2.99, low=2.9, high=3.0)}
     gain = Gain(40.0, 10.0, 70.0)
     apart = replace(Difference.of(weak, bound, 50.0, 0.0, {}), gain=gain, by_group={"A": gain, "B": gain})
     assert _doubt(apart, weak.effect, True, FERRY) == "its factor of 2.99 - stands at the bound of its search"
+
+
+def test_an_interval_over_all_logs_ends_where_the_parameter_does() -> None:
+    lag = Parameter("time_constant", "s", 0.5, 0.0, 10.0)
+    assert within_possible(lag, 0.7, 1.0) == Estimate(0.7, 0.0, 0.7 + 1.96, "s")
+    assert within_possible(lag, 9.5, 1.0) == Estimate(9.5, 9.5 - 1.96, 10.0, "s")
+    assert within_possible(lag, 5.0, 1.0) == Estimate.normal(5.0, 1.0, "s")
+    # A value beyond what is possible stays in its interval, and is judged for it.
+    assert within_possible(lag, -0.2, 0.05).low == -0.2
 
 
 def taught(hull: Any = None, doubt: str = "") -> Diagnosis:

@@ -18,7 +18,14 @@ from ferryid.diagnose.inference.campaign_properties import properties_of, with_p
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.group_differences import Comparison, compare_near, differences_of, in_groups
 from ferryid.diagnose.inference.thresholds import INFERENCE
-from ferryid.diagnose.judging.group_differences import Difference, JudgedGroups, judge_groups, smallest_note, summary
+from ferryid.diagnose.judging.group_differences import (
+    Difference,
+    JudgedGroups,
+    _of_regimes,
+    judge_groups,
+    smallest_note,
+    summary,
+)
 from ferryid.effects import effects
 from ferryid.types import no_progress
 from ferryid.vessel import load_profile
@@ -112,6 +119,24 @@ def test_logs_of_one_group_that_scatter_make_no_difference() -> None:
     # Half of what the logs differ by is no difference of the groups.
     assert scattered.errors[0] > 0.05
     assert scattered.evidence < INFERENCE.prior_odds
+
+
+def test_two_logs_that_moved_unlike_beside_a_hull_of_their_own_confirm_no_difference() -> None:
+    first, second = weakened(1.0).members[:2]
+    seen = second.windows.measurements
+    fast = replace(
+        second, windows=replace(second.windows, measurements=replace(seen, nu=seen.nu + np.array([3.0, 0.0, 0.0])))
+    )
+
+    def doubt(other: Member, known: bool, names: Sequence[str] = "AB") -> str:
+        campaign = replace(weakened(1.0), members=(first, *[other] * (len(names) - 1)))
+        return _of_regimes(in_groups(replace(campaign, hull=replace(campaign.hull, known=known)), names))
+
+    assert "which moved unlike in surge, and may be off" in doubt(fast, known=False)
+    # A hull that is known is so at either speed, and further logs of a group show by how much it scatters.
+    assert doubt(fast, known=True) == ""
+    assert doubt(fast, known=False, names="ABB") == ""
+    assert doubt(first, known=False) == ""
 
 
 def test_another_shape_of_a_thrust_curve_is_a_difference_beside_that_of_all_logs_only() -> None:

@@ -1,0 +1,121 @@
+"""Columns of a table that hold a value in some rows only, as where several sensors were merged into one table by time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ferryid.errors import FerryIdError
+from ferryid.ingest.clocks import ClockReport
+from ferryid.signals.align import align
+from ferryid.signals.faults import find_faults
+from ferryid.signals.sampling import check_sampling
+from ferryid.signals.stream import Recording, Stream
+from ferryid.types import Floats
+from ferryid.vessel import load_profile
+
+PROFILE = load_profile("milliampere")
+ROWS_S = np.arange(0.0, 120.0, 0.1)
+
+
+def stream(topic: str, time_s: Floats, columns: dict[str, Floats]) -> Stream:
+    time_ns = np.round(time_s * 1e9).astype(np.int64)
+    clock = ClockReport("column", len(time_ns), float("nan"), float("nan"), float("nan"), 0.0, 0, 0, 0)
+    return Stream(topic, time_ns, columns, clock, time_ns)
+
+
+def recording(*streams: Stream) -> Recording:
+    return Recording("trial", (), "", "", "", {one.topic: one for one in streams}, (), (), {}, {}, ())
+
+
+def thrusters(t: Floats) -> dict[str, Floats]:
+    return {
+        "n_thruster1": 300.0 + 3.0 * t,
+        "alpha_thruster1": 0.01 * t,
+        "n_thruster2": 100.0 + t,
+        "alpha_thruster2": 0.5 - 0.001 * t,
+    }
+
+
+def heading(t: Floats) -> Floats:
+    return 0.3 * np.sin(0.1 * t)
+
+
+def place(t: Floats) -> dict[str, Floats]:
+    return {"x": t + 3.0 * np.sin(0.05 * t), "y": 0.5 * t}
+
+
+def merged(every: int, skipped: tuple[int, ...] = ()) -> Recording:
+    """A table of 10 Hz of which each so many-th row has a position, but those that were skipped."""
+    t = ROWS_S
+    has = np.isin(np.arange(t.size) % every, 0) & ~np.isin(np.arange(t.size) // every, skipped)
+    position = {name: np.where(has, values, np.nan) for name, values in place(t).items()}
+    return recording(stream("table", t, {**position, "psi": heading(t), **thrusters(t)}))
+
+
+def test_a_position_in_every_tenth_row_is_a_source_of_its_own_rate() -> None:
+    t = ROWS_S
+    apart = recording(stream("/fix", t[::10], place(t[::10])), stream("/boat", t, {"psi": heading(t), **thrusters(t)}))
+    one, other = align(merged(10), PROFILE), align(apart, PROFILE)
+    assert one.rate_hz == other.rate_hz == 1.0
+    for name in ("u", "v", "r", "x", "n_thruster1"):
+        np.testing.assert_allclose(one.columns[name], other.columns[name], rtol=0.0, atol=1e-12, err_msg=name)
+    assert "table: x, y have a value in 120 of 1200 rows, every 1 s: taken as measured at that rate." in one.repairs
+    assert not any("missing (NaN)" in said for said in one.repairs)
+
+
+def test_sensors_that_were_merged_by_time_are_taken_apart() -> None:
+    """Rows of three sensors in turn, each with the values of one: all but a tenth of each column was said to be missing."""
+    fix_s, boat_s = np.arange(0.003, 60.0, 0.2), np.arange(0.0, 60.0, 0.11)
+    rows_s = np.sort(np.concatenate([fix_s, boat_s, boat_s + 0.004]))
+
+    def at(times: Floats, values: dict[str, Floats]) -> dict[str, Floats]:
+        there = np.isin(rows_s, times)
+        return {name: np.where(there, np.interp(rows_s, times, one), np.nan) for name, one in values.items()}
+
+    every = at(fix_s, place(fix_s)) | at(boat_s, {"psi": heading(boat_s)}) | at(boat_s + 0.004, thrusters(boat_s))
+    # One number of a fix is missing: north and east stay at the same times.
+    every["y"][int(np.flatnonzero(np.isfinite(every["y"]))[7])] = np.nan
+    faults = find_faults(recording(stream("table", rows_s, every)))
+    assert [sorted(one.columns) for one in faults.sources] == [["x", "y"], ["psi"], sorted(thrusters(fix_s))]
+    assert [len(one.time_ns) for one in faults.sources] == [len(fix_s), len(boat_s), len(boat_s)]
+    assert [said for said in faults.taken_out if "missing" in said] == [
+        "y: 1 of 300 samples is missing (NaN); short ones are interpolated."
+    ]
+
+
+def test_fixes_that_fail_are_still_gaps_of_it() -> None:
+    track = align(merged(10, skipped=tuple(range(40, 60))), PROFILE)
+    assert not track.valid[42:58].any()
+    assert track.valid[:36].all()
+    assert any("1 gap longer than" in said for said in track.repairs)
+
+
+def test_rows_that_are_missing_here_and_there_stay_where_they_are() -> None:
+    t, log = ROWS_S, merged(1)
+    table = log.streams["table"]
+    table = replace(
+        table, columns={**table.columns, "x": np.where(np.arange(t.size) % 4 == 1, np.nan, table.columns["x"])}
+    )
+    faults = find_faults(replace(log, streams={"table": table}))
+    assert len(faults.sources) == 1
+    assert "x: 300 of 1200 samples are missing (NaN); short ones are interpolated." in faults.taken_out
+
+
+def test_an_order_that_is_written_when_it_changes_holds() -> None:
+    t = ROWS_S
+    told = np.isin(np.arange(t.size), [0, 31, 32, 190, 400, 405, 800, 1001])
+    orders = {name: np.where(told, np.cumsum(told) * 50.0, np.nan) for name in ("n_cmd_thruster1", "n_cmd_thruster2")}
+    angles = {name: values for name, values in thrusters(t).items() if name.startswith("alpha")}
+    track = align(recording(stream("table", t, {**place(t), "psi": heading(t), **orders, **angles})), PROFILE)
+    assert track.valid[5:-5].all()
+    np.testing.assert_allclose(track.columns["n_cmd_thruster1"][350], 200.0)
+
+
+def test_a_rate_that_is_too_slow_for_the_vessel_is_told_of_the_position_and_not_of_the_rows() -> None:
+    with pytest.raises(
+        FerryIdError, match=r"found x of table every 3 s, where .* Fix: record the navigation at a higher"
+    ):
+        check_sampling(merged(30), PROFILE)
