@@ -144,21 +144,25 @@ class EstimationProblem:
         """`hull_slopes` of the plain force model."""
         return self.hull_slopes(self.plain)
 
-    def hull_slopes(self, force_model: ForceModel) -> Floats:
+    def hull_slopes(self, force_model: ForceModel, hull: Floats | None = None) -> Floats:
         """Return derivatives of the prediction errors by the hull's coefficients, in their spreads, shape (w, 26).
 
-        Coefficients that cannot move have none.
+        By those of the hull, shape (26,), on which the effects of the force model act; its own where None. Coefficients that
+        cannot move have none.
         """
         free = np.flatnonzero(self.hull_spread)
         every = np.zeros((self.steps.measured_channels.size, len(self.hull_spread)))
-        every[:, free] = self.slopes_of(force_model, free)
+        every[:, free] = self.slopes_of(force_model, force_model.hull if hull is None else hull, free)
         return every
 
-    def slopes_of(self, force_model: ForceModel, places: Ints) -> Floats:
+    def slopes_of(self, force_model: ForceModel, hull: Floats, places: Ints) -> Floats:
         """Return `hull_slopes` by some of the coefficients that can move, shape (w, k)."""
         if not places.size:
             return np.empty((self.steps.measured_channels.size, 0))
-        changes = self.steps.hull_changes(force_model, places, HULL_DIFFERENCE * self.hull_spread[places])
+        # Effects multiply coefficients: what one moves by is multiplied too.
+        there, here = force_model.hull[places], hull[places]
+        factor = np.where(here != 0.0, there / np.where(here != 0.0, here, 1.0), 1.0)
+        changes = self.steps.hull_changes(force_model, places, HULL_DIFFERENCE * factor * self.hull_spread[places])
         changes /= HULL_DIFFERENCE
         # Column by column, as those of a starting point lie: products of the two are rounded alike.
         return np.asfortranarray(self.whitening_filter.white(changes))
@@ -241,7 +245,7 @@ class StartingPoint:
 
 def starting_point(problem: EstimationProblem, made: Fit) -> StartingPoint:
     """Return where to begin a fit that is not far from another."""
-    return StartingPoint(made.hull, problem.hull_slopes(fitted_force_model(problem.plain, made)))
+    return StartingPoint(made.hull, problem.hull_slopes(fitted_force_model(problem.plain, made), made.hull))
 
 
 def fit(
@@ -343,7 +347,7 @@ def fit(
     hull_taken, effects_taken = chain, list[ForceModel]()
     for count in range(max(steps, 1)):
         if hull_taken is not chain and (bends or count % HULL_SLOPE_ITERATIONS == 0):
-            by_hull, hull_taken, fresh = problem.slopes_of(chain[-1], moving), chain, True
+            by_hull, hull_taken, fresh = problem.slopes_of(chain[-1], chain[0].hull, moving), chain, True
             of_hull = by_hull.T @ by_hull
         if free.size and effects_taken is not chain:
             effects_taken = chain
@@ -387,7 +391,7 @@ def fit(
         if gained < CONVERGED_GAIN:
             if fresh or steps <= HULL_SLOPE_ITERATIONS:
                 break
-            by_hull, hull_taken, fresh = problem.slopes_of(chain[-1], moving), chain, True
+            by_hull, hull_taken, fresh = problem.slopes_of(chain[-1], chain[0].hull, moving), chain, True
             of_hull = by_hull.T @ by_hull
     covariance = np.asarray(np.linalg.inv(A)[h:, h:] * np.outer(size, size), dtype=np.float64)
     fitted = neutral + size * z[h:]

@@ -88,7 +88,7 @@ def _left(problem: EstimationProblem, made: Fit) -> float:
     moves = problem.hull_spread > 0.0
     of_hull = np.where(moves, (made.hull - problem.plain.hull) / np.where(moves, problem.hull_spread, 1.0), 0.0)
     of_motion = motion_responses(problem, made)
-    hull_slopes = problem.hull_slopes(fitted_force_model(problem.plain, made))
+    hull_slopes = problem.hull_slopes(fitted_force_model(problem.plain, made), made.hull)
     slopes = np.hstack([hull_slopes, effect_slopes(problem, made), of_motion])
     departed = np.concatenate([of_hull, (values - neutral) / size, np.zeros(of_motion.shape[1])])
     step = -np.linalg.solve(slopes.T @ slopes + np.eye(len(departed)), slopes.T @ errors + departed)
