@@ -180,7 +180,11 @@ def test_evidence_weighs_filters_against_each_other() -> None:
 
 
 @pytest.mark.slow
-def test_slopes_by_the_hull_are_those_of_whitened_gaps() -> None:
+@pytest.mark.parametrize("factors", [(1.0, 1.0, 1.0), (1.8, 1.4, 0.7)], ids=["plain", "fouled"])
+def test_slopes_by_the_hull_are_those_of_whitened_gaps(factors: tuple[float, float, float]) -> None:
+    def acted(force_model: ForceModel) -> ForceModel:
+        return effects()["fouling"].apply(force_model, np.array(factors), None)
+
     case = problem(60.0)
     n = len(case.plain.measurements.t)
     moving = np.random.default_rng(1).normal(size=(n, 3)) * [1.0, 0.5, 0.2]
@@ -191,12 +195,13 @@ def test_slopes_by_the_hull_are_those_of_whitened_gaps() -> None:
     case = replace(
         case, windows=replace(case.windows, measurements=steps.measurements), plain=plain, hull_spread=spread
     )
-    found = case.hull_slopes(plain)
+    # Fouling multiplies coefficients: what one moves by is multiplied too.
+    found = case.hull_slopes(acted(plain), plain.hull)
     assert not found[:, spread == 0.0].any()
     for k in np.flatnonzero(spread):
         hull = plain.hull.copy()
         hull[k] += 0.1 * spread[k]
-        slope = (case.white(replace(plain, hull=hull)) - case.white(plain)) / 0.1
+        slope = (case.white(acted(replace(plain, hull=hull))) - case.white(acted(plain))) / 0.1
         np.testing.assert_allclose(found[:, k], slope, rtol=0.0, atol=1e-6 * np.abs(slope).max())
 
 
