@@ -302,7 +302,12 @@ def _sync_all(path: Path) -> None:
 
         # A journal takes all that is asked for at once in one turn, and what is asked for one after the other in one turn each.
         with ThreadPoolExecutor(min(_AT_ONCE, len(files))) as pool:
-            for _ in pool.map(sync, files):
+            synced: Iterator[None]
+            try:
+                synced = pool.map(sync, files)
+            except RuntimeError:  # no room for a thread
+                synced = map(sync, files)
+            for _ in synced:
                 pass
     else:
         for file in files:

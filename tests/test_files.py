@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Callable
 from pathlib import Path
 
@@ -221,6 +222,20 @@ def test_all_of_a_folder_is_synced_before_it_is_renamed(tmp_path: Path, calls: l
     # Files at once, in any order, and folders when all that is in them is on disk.
     assert sorted(calls[:2]) == ["fsync a", "fsync b"]
     assert calls[2:] == ["fsync figures", f"fsync {name}", "replace report", f"fsync {tmp_path.name}"]
+
+
+def test_a_folder_is_written_where_there_is_no_room_for_a_thread(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(thread: threading.Thread) -> None:
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(threading.Thread, "start", refuse)
+    with replacing(tmp_path / "report") as temporary:
+        temporary.mkdir()
+        for name in "ab":
+            (temporary / name).write_text(name, encoding="utf-8")
+    assert sorted(one.name for one in (tmp_path / "report").iterdir()) == ["a", "b"]
 
 
 def test_a_file_system_without_links_and_syncs_is_written_all_the_same(

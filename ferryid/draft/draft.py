@@ -29,6 +29,10 @@ from ferryid.vessel.thrusters import needed_roles
 
 FRAME_ID = "header.frame_id"
 _AHEAD = frozenset({"u", "surge", "speed", "spd", "sog", "stw", "vel", "velocity"})
+_OTHER_SPEEDS = frozenset(
+    {"air", "angular", "current", "down", "engine", "heave", "motor", "prop", "propeller", "rate", "rudder", "sway"}
+    | {"thruster", "turn", "vertical", "wind", "yaw"}
+)
 
 
 @dataclass(frozen=True)
@@ -176,16 +180,20 @@ def _no_way(signals: Sequence[MappedSignal], topics: Sequence[Topic]) -> tuple[s
     """Return that nothing is mapped that shows how fast the vessel moves, with what may be a speed of surge alone."""
     if {"position", "velocity"} & {one.quantity for one in signals}:
         return ()
+    mapped = {(one.topic, field) for one in signals for field in one.fields}
     speeds = [
         (topic.name, path)
         for topic in topics
         for path in topic.fields
-        if set(words_of(path)) & _AHEAD and not set(words_of(path)) & ORDERS
+        if set(words_of(path)) & _AHEAD
+        and not set(words_of(path)) & (ORDERS | _OTHER_SPEEDS)
+        and (topic.name, path) not in mapped
     ]
     told = "no position and no velocity is mapped, of which a fit needs one"
     if not speeds:
         return (f"{told}, and no field has a name of either",)
-    topic, field = speeds[0]
+    # That with the fewest other words in its name.
+    topic, field = min(speeds, key=lambda one: len(set(words_of(one[1])) - _AHEAD))
     return (
         f'{told}: if "{field}" is the speed ahead, map it as surge alone, [signals.velocity] with topic = "{topic}", '
         f'fields = ["{field}"], unit = "m/s" and frame = "FRD"',

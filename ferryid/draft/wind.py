@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -55,7 +56,7 @@ def wind_signal(pairs: Sequence[Pair], samples: Samples, motion: Motion) -> Mapp
     usable = {name: size for name, size in spread.items() if named in name}
     best = min(usable, key=lambda one: usable[one]) if usable else "bow, apparent" if named != "true" else "bow, true"
     # What names do not state, the steadier wind does, if by much.
-    if not named and spread and usable[best] > 0.9 * spread["bow, apparent"]:
+    if not named and spread and usable[best] > 0.9 * spread.get("bow, apparent", math.inf):
         best = "bow, apparent"
     reference, air = options[best]
     shown = ", ".join(f"{name} {size:.2f}" for name, size in sorted(spread.items(), key=lambda one: one[1]))

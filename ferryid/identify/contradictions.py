@@ -133,13 +133,13 @@ def wrong_size(
     if small:
         cause = "they are several times too small, or the profile's mass is too large"
     else:
-        late = ", or follow their orders late" if orders else ""
+        late = " or follow their orders late" if orders else ""
         cause = f"they are several times too large, the actuators were not engaged{late}, or the profile's mass is too small"
     remedy = (
         "correct the unit of the actuators' signals (1 rad/s is 9.55 rpm, 1 kgf 9.81 N), the thrust curve or mass_kg"
     )
     if orders and not small:
-        remedy += ", or map what the actuators did, if the log has it: within a second a small vessel has answered"
+        remedy += ", or map the actuators' feedback in place of their orders, if the log has it"
     return f"{told}{cause}. Fix: in {profile}, {remedy}"
 
 

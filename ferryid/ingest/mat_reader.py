@@ -110,8 +110,7 @@ def _without(variables: MatVariables, layout: TableLayout | None) -> str:
             f"{counted(count, 'object')} of MATLAB ({name}: {kind}{', ...' if count > 1 else ''}), which only MATLAB reads, "
             f"and no other time series. Fix: in MATLAB, {_remedy(name, kind)}"
         )
-    if variables.cells:
-        names = list(variables.cells)
+    if names := [name for name, most in variables.cells.items() if most >= LEAST_SERIES_ROWS]:
         shown = ", ".join(names[:_SHOWN_NAMES]) + (", ..." if len(names) > _SHOWN_NAMES else "")
         return (
             f"{counted(len(names), 'cell array')} ({shown}), which are not read, and no other time series. Fix: in MATLAB, "

@@ -23,6 +23,7 @@ _TOGETHER = (
     ("current_N", "current_E"),
 )
 """Signals that are worked on in pairs, at the same times."""
+_WEATHER = ("wind", "current")
 
 
 @dataclass(frozen=True)
@@ -103,35 +104,46 @@ def at_own_rates(stream: Stream) -> tuple[Stream, ...]:
     """Return a stream in parts, each of the columns that have their values in the same rows, at the times of these.
 
     A table that several sensors were merged into has rows in which others than the one that was read have no value. A column
-    of which two values usually lie two rows apart or more, or farther than what counts as a gap of the rows, is one of these.
-    Other columns stay together, whatever they lack.
+    of which two values usually lie two rows apart or more, at regular times, is one of these; so is an order, which may be
+    written when it changes. Other columns stay together, whatever they lack: a sensor that fails has gaps.
     """
     time_s = np.asarray((stream.time_ns - stream.time_ns[:1]) * 1e-9, dtype=np.float64)
-    if time_s.size < 2:
-        return (stream,)
-    least_s = min(_bridge(_usual_period(time_s)), SIGNALS.rows_apart * float(np.median(np.diff(time_s))))
     columns: dict[bytes, list[str]] = {}
     rows: dict[bytes, Flags] = {}
     for name, values in stream.columns.items():
         finite: Flags = np.isfinite(values)
         for other in next((pair for pair in _TOGETHER if name in pair), ()):
             finite = finite | np.isfinite(stream.columns.get(other, values))
-        times = time_s[finite]
-        apart = not is_load(name) and 1 < times.size < time_s.size and float(np.median(np.diff(times))) >= least_s
-        key = finite.tobytes() if apart else b""
+        key = finite.tobytes() if not is_load(name) and _at_own_rate(name, finite, time_s) else b""
         columns.setdefault(key, []).append(name)
-        rows.setdefault(key, finite if apart else np.ones(time_s.size, dtype=bool))
+        rows.setdefault(key, finite)
     if list(columns) in ([], [b""]):
         return (stream,)
     return tuple(
         replace(
             stream,
-            time_ns=stream.time_ns[rows[key]],
-            columns={name: stream.columns[name][rows[key]] for name in names},
-            receive_ns=stream.receive_ns[rows[key]],
+            time_ns=stream.time_ns[rows[key]] if key else stream.time_ns,
+            columns={name: stream.columns[name][rows[key]] if key else stream.columns[name] for name in names},
+            receive_ns=stream.receive_ns[rows[key]] if key else stream.receive_ns,
         )
         for key, names in columns.items()
     )
+
+
+def _at_own_rate(name: str, finite: Flags, time_s: Floats) -> bool:
+    """Return whether a column with values on some rows, shape (n,), has them at a rate of its own."""
+    rows = np.flatnonzero(finite)
+    if not 1 < rows.size < finite.size or np.median(np.diff(rows)) < SIGNALS.rows_apart:
+        return False
+    if is_order(name):
+        return True
+    apart_s = np.diff(time_s[rows])
+    usual_s = float(np.median(apart_s))
+    low, high = SIGNALS.regular_range
+    regular = float(np.mean((apart_s > low * usual_s) & (apart_s < high * usual_s)))
+    # The weather may be noted once a minute, and the motion of no vessel.
+    often = usual_s <= SIGNALS.slowest_sensor_s or name.startswith(_WEATHER)
+    return often and regular >= SIGNALS.regular_share
 
 
 def source_of(stream: Stream) -> Source:

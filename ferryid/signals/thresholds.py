@@ -21,10 +21,28 @@ class SignalThresholds:
     )
     gap_s: float = threshold(0.5, "s", "shortest gap", "convention: a vessel's velocity changes little meanwhile")
     rows_apart: float = threshold(
-        1.75,
+        2.0,
         "rows",
         "usual distance of the values of a column of a table from which the rows between are other sensors'",
-        "derived: two rows, less what times jitter by",
+        "derived: another sensor of the same rate has the rows between",
+    )
+    regular_range: tuple[float, ...] = threshold(
+        (0.6, 1.6),
+        "of the usual",
+        "distances between the values of such a column that count as regular",
+        "derived: a sensor of 4 Hz has values two and three rows of 10 Hz apart",
+    )
+    regular_share: float = threshold(
+        0.6,
+        "of the distances",
+        "that are regular at least where a column has a rate of its own",
+        "derived: where values are lost at random, less than half are",
+    )
+    slowest_sensor_s: float = threshold(
+        10.0,
+        "s",
+        "usual distance from which on the values of a column are what is left of a sensor that fails",
+        "convention: slow receivers and logs report the motion every ten seconds",
     )
     stuck_periods: float = threshold(
         10.0,

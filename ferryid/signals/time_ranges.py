@@ -13,9 +13,10 @@ import numpy as np
 from ferryid.errors import FerryIdError
 from ferryid.signals.empty_streams import without_empty
 from ferryid.signals.order_of_time import dated
+from ferryid.signals.quality import is_order
 from ferryid.signals.source import on_change
 from ferryid.signals.stream import Recording, Stream
-from ferryid.types import Nanoseconds, TimeRange, TimeRanges
+from ferryid.types import Floats, Ints, Nanoseconds, TimeRange, TimeRanges
 from ferryid.vessel.profile import Profile
 
 _CLOCK = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{2}(?:\.\d+)?))?")
@@ -192,6 +193,7 @@ def _cut_stream(stream: Stream, spans: Spans) -> Stream:
     held = len(time_ns) > 0 and on_change(stream)
     rows: list[int] = []
     times: list[Nanoseconds] = []
+    begins: list[int] = []
     for first, last in spans:
         begin, stop = np.searchsorted(time_ns, [first, last + 1])
         inside = time_ns[begin:stop]
@@ -199,6 +201,8 @@ def _cut_stream(stream: Stream, spans: Spans) -> Stream:
             # The value that holds when the range begins.
             begin -= 1
             inside = np.concatenate(([first], inside))
+        if stop > begin:
+            begins.append(len(rows))
         rows.extend(range(int(begin), int(stop)))
         times.append(np.asarray(inside, dtype=np.int64))
     at = np.asarray(rows, dtype=np.int64)
@@ -208,10 +212,21 @@ def _cut_stream(stream: Stream, spans: Spans) -> Stream:
     return Stream(
         stream.topic,
         joined,
-        {name: np.asarray(values)[at] for name, values in stream.columns.items()},
+        {name: _column(name, np.asarray(values), at, begins) for name, values in stream.columns.items()},
         replace(stream.clock, count=len(at), gaps=gaps),
         receive,
     )
+
+
+def _column(name: str, values: Floats, rows: Ints, begins: Sequence[int]) -> Floats:
+    """Return a column on some rows; an order that was written before a range begins, as it changed then, holds there."""
+    kept = np.array(values[rows])
+    for first in begins if is_order(name) else ():
+        if not np.isfinite(kept[first]):
+            earlier = np.flatnonzero(np.isfinite(values[: rows[first]]))
+            if earlier.size:
+                kept[first] = values[earlier[-1]]
+    return kept
 
 
 def content_of(sha256: str) -> str:

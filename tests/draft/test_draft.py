@@ -414,7 +414,14 @@ def test_a_heading_that_the_motion_does_not_show_is_to_be_checked(tmp_path: Path
 
 
 @pytest.mark.parametrize(
-    ("name", "told"), [("u", 'fields = ["u"]'), ("speed", 'fields = ["speed"]'), ("depth", "no field")]
+    ("name", "told"),
+    [
+        ("u", 'fields = ["u"]'),
+        ("speed", 'fields = ["speed"]'),
+        ("depth", "no field"),
+        ("motor_speed", "no field"),
+        ("wind_speed", "no field"),
+    ],
 )
 def test_a_draft_without_a_position_and_a_velocity_says_so(tmp_path: Path, name: str, told: str) -> None:
     columns = sailed()

@@ -463,8 +463,8 @@ def test_orders_that_are_followed_late_may_be_why_forces_are_hardly_followed() -
     """A boat that answers its orders within a second was refused for a wrong unit of its thrust."""
     response, spread, share = np.array([0.09, np.nan, 0.16]), np.full(3, 0.01), np.ones(3)
     said = wrong_size(response, spread, share, "boat", orders=True)
-    assert "the actuators were not engaged, or follow their orders late, or the profile's mass is too small" in said
-    assert "map what the actuators did" in said
+    assert "the actuators were not engaged or follow their orders late, or the profile's mass is too small" in said
+    assert "map the actuators' feedback in place of their orders" in said
     assert "late" not in wrong_size(response, spread, share, "boat")
     assert "late" not in wrong_size(3.0 / IDENTIFY.least_inertia * share, spread, share, "boat", orders=True)
     assert [orders_alone(load_profile(name)) for name in ("gunnerus", "milliampere", "vtec-usv")] == [True, False, True]

@@ -22,6 +22,7 @@ from ferryid.signals.inspect import inspect
 N = 30
 T = np.arange(N) * 0.1
 U = np.sin(T)
+LONG = np.arange(60.0)
 R = np.linspace(0.0, 1.0, N) ** 2
 
 
@@ -234,9 +235,10 @@ def test_a_length_that_swallows_the_next_variable_is_told_and_costs_nothing(tmp_
         ({"A": np.eye(4), "b": np.ones((4, 1)), "name": "boat"}, "looks like a time.*found A, b, name"),
         ({"t": T}, "looks like a time"),
         (
-            {"times": _cells(T, T[:9]), "speeds": _cells(U, U[:9]), "gain": 2.0},
+            {"times": _cells(LONG, T), "speeds": _cells(LONG, U), "gain": 2.0},
             r"2 cell arrays \(times, speeds\), which are not read, .*struct\('t', \.\.\., 'u', times\{1\}\)",
         ),
+        ({"stamps": T, "settings": _cells(1.0, "auto")}, "looks like a time.*found stamps"),
         ({}, "looks like a time.*found nothing"),
     ],
 )
@@ -247,8 +249,7 @@ def test_what_is_no_time_series_is_one_line(tmp_path: Path, variables: dict[str,
 
 
 def test_cell_arrays_of_signals_beside_a_time_series_are_listed_as_lost(tmp_path: Path) -> None:
-    long = np.arange(60.0)
-    cells = {"runs": _cells({"t": long, "u": long}, "a note"), "names": _cells("a", "b"), "gains": _cells(T[:3], 2.0)}
+    cells = {"runs": _cells({"t": LONG, "u": LONG}, "a note"), "names": _cells("a", "b"), "gains": _cells(T[:3], 2.0)}
     (loss,) = open_log(saved(tmp_path, {"t": T, "u": U, **cells})).losses
     assert loss.what.startswith("runs is a cell array, which is not read. Fix: in MATLAB, save ")
 

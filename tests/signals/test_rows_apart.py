@@ -13,7 +13,8 @@ from ferryid.signals.align import align
 from ferryid.signals.faults import find_faults
 from ferryid.signals.sampling import check_sampling
 from ferryid.signals.stream import Recording, Stream
-from ferryid.types import Floats
+from ferryid.signals.time_ranges import cut
+from ferryid.types import Flags, Floats
 from ferryid.vessel import load_profile
 
 PROFILE = load_profile("milliampere")
@@ -102,6 +103,55 @@ def test_rows_that_are_missing_here_and_there_stay_where_they_are() -> None:
     faults = find_faults(replace(log, streams={"table": table}))
     assert len(faults.sources) == 1
     assert "x: 300 of 1200 samples are missing (NaN); short ones are interpolated." in faults.taken_out
+
+
+def motion(t: Floats) -> dict[str, Floats]:
+    return {"u": 1.0 + 0.1 * np.sin(0.2 * t), "v": 0.1 * np.cos(0.2 * t), "r": 0.03 * np.cos(0.1 * t)}
+
+
+@pytest.mark.parametrize(
+    "kept",
+    [
+        np.isin(np.arange(ROWS_S.size), [5, 400, 800, 1190]),
+        np.random.default_rng(0).random(ROWS_S.size) < 0.4,
+        np.random.default_rng(1).random(ROWS_S.size) < 0.28,
+    ],
+    ids=["4 of 1200", "two fifths", "a quarter"],
+)
+def test_what_is_left_of_a_sensor_that_fails_is_no_rate_of_its_own(kept: Flags) -> None:
+    t = ROWS_S
+    feedback = thrusters(t)
+    feedback["n_thruster1"] = np.where(kept, feedback["n_thruster1"], np.nan)
+    columns = {**motion(t), "psi": heading(t), **feedback}
+    faults = find_faults(recording(stream("table", t, columns)))
+    assert len(faults.sources) == 1
+    assert any(said.startswith("n_thruster1: ") and "missing (NaN)" in said for said in faults.taken_out)
+    if kept.sum() < 10:
+        assert not align(recording(stream("table", t, columns)), PROFILE).valid[60:340].any()
+
+
+@pytest.mark.parametrize("first", range(4))
+def test_two_sensors_of_one_rate_are_taken_apart_wherever_the_log_begins(first: int) -> None:
+    boat_s = np.arange(0.0, 60.0, 0.1)
+    rows_s = np.sort(np.concatenate([boat_s, boat_s + 0.004]))[first:]
+    of_boat = np.isin(rows_s, boat_s)
+    columns = {
+        name: np.where(of_boat, one, np.nan) for name, one in (motion(rows_s) | {"psi": heading(rows_s)}).items()
+    }
+    columns |= {name: np.where(of_boat, np.nan, one) for name, one in thrusters(rows_s).items()}
+    faults = find_faults(recording(stream("table", rows_s, columns)))
+    assert [sorted(one.columns) for one in faults.sources] == [["psi", "r", "u", "v"], sorted(thrusters(rows_s))]
+
+
+def test_an_order_that_was_written_before_a_range_holds_in_it() -> None:
+    t = ROWS_S
+    told = np.isin(np.arange(t.size), [0, 31, 800])
+    orders = {name: np.where(told, np.cumsum(told) * 50.0, np.nan) for name in ("n_cmd_thruster1", "n_cmd_thruster2")}
+    angles = {name: values for name, values in thrusters(t).items() if name.startswith("alpha")}
+    log = recording(stream("table", t, {**place(t), "psi": heading(t), **orders, **angles}))
+    track = align(cut(log, PROFILE, ((30.0, None),)), PROFILE)
+    assert track.valid[5:-5].all()
+    np.testing.assert_allclose(track.columns["n_cmd_thruster1"][100], 100.0)
 
 
 def test_an_order_that_is_written_when_it_changes_holds() -> None:

@@ -31,6 +31,7 @@ class HullBaseline:
     profile: Profile
     model: Model | None = None
     joint: bool = False
+    hull_logs: int = 1
     updates_model: bool = True
 
     @property
@@ -56,6 +57,7 @@ class SimulationBaseline:
 
     simulated: Simulation
     joint: bool = False
+    hull_logs: int = 1
     updates_model: bool = False
 
     @property
@@ -96,6 +98,11 @@ class CampaignBaseline:
     def hull_known(self) -> bool:
         """True where the profile has a hull model that estimates may lean on, or there is a fitted one."""
         return self.model is not None or self.profile.hull.is_known
+
+    @property
+    def hull_logs(self) -> int:
+        """Logs that its hull was fitted to, references among them."""
+        return len(self.hull.place)
 
     @property
     def sensors(self) -> Mapping[str, Mapping[str, Estimate]]:

@@ -69,6 +69,8 @@ class Baseline(Protocol):
         True where its hull comes from a profile or a model, not from the logs that are diagnosed.
     joint
         True where its hull was fitted to all logs of a campaign.
+    hull_logs
+        Logs that its hull is fitted to, references among them: one where each log is compared with its own.
     updates_model
         True where the findings can enter a model.
     sensors
@@ -79,6 +81,8 @@ class Baseline(Protocol):
     def hull_known(self) -> bool: ...
     @property
     def joint(self) -> bool: ...
+    @property
+    def hull_logs(self) -> int: ...
     @property
     def updates_model(self) -> bool: ...
     @property

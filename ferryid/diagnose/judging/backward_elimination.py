@@ -83,13 +83,15 @@ def eliminate_backward(
         better = [(i, one) for i, one in better if one.fit.keys not in tried]
         swapped = None
         for replaced, best in sorted(better, key=lambda pair: -pair[1].gain):
+            if swaps >= JUDGING.most_replacements:
+                break
             # What was selected first may be less likely beside what was selected later than another in its place.
             tried.add(best.fit.keys)
             swaps += 1
             swapped = prune(problem, with_both(problem, kept, replaced, best.fit))
             tried.add(swapped.keys)
             # What was judged before would fall again, and lead back here.
-            if _spans(swapped) not in judged and swaps <= JUDGING.most_replacements:
+            if _spans(swapped) not in judged:
                 break
             swapped = None
         if swapped is not None:

@@ -114,6 +114,8 @@ class LogFigures:
         True where the hull comes from a profile or a model, not from the logs that are diagnosed.
     joint
         True where the hull was fitted to all logs of a campaign.
+    hull_logs
+        Logs that the hull was fitted to, references among them.
     velocity_noise
         Noise of the velocity, times damping, over what moves the vessel, by axis.
     unsteady
@@ -138,6 +140,7 @@ class LogFigures:
 
     hull_known: bool = True
     joint: bool = False
+    hull_logs: int = 1
     velocity_noise: Mapping[str, float] = field(default_factory=dict)
     unsteady: bool = False
     campaign: tuple[frozenset[Key], ...] = ()

@@ -137,6 +137,7 @@ def _too_short(
     figures = replace(
         shared,
         joint=baseline.joint,
+        hull_logs=baseline.hull_logs,
         baseline_sensors=baseline.sensors,
         circumstances=where,
     )

@@ -292,7 +292,7 @@ def unexplained_shares(context: Context) -> dict[str, float]:
 
 def _one_log_at_most(log: LogFigures) -> bool:
     """Return whether the hull comes from the log itself and one other at most."""
-    return not log.joint or 0 < len(log.campaign) < JUDGING.campaign_logs
+    return log.hull_logs < JUDGING.campaign_logs
 
 
 @rule(of_name=True)

@@ -260,10 +260,12 @@ def notes_of(judged: JudgedGroups, campaign: Campaign) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class _Regimes:
-    """An axis on which the groups moved unlike: the share of B's velocities within the range of A's, and that range."""
+    """An axis on which the groups moved unlike: the share of one group's velocities within the range of the other's."""
 
     axis: str
     unit: str
+    group: str
+    other: str
     share: float
     low: float
     high: float
@@ -272,7 +274,8 @@ class _Regimes:
     def says(self) -> str:
         """Return it as a sentence."""
         return (
-            f"Only {100.0 * self.share:.0f} % of the {self.axis} velocity of group B lies within that of group A "
+            f"Only {100.0 * self.share:.0f} % of the {self.axis} velocity of group {self.group} lies within that of group "
+            f"{self.other} "
             f"({self.low:.2f} to {self.high:.2f} {self.unit}): where the hull model is off, that appears as a difference."
         )
 
@@ -293,11 +296,14 @@ def _regimes(campaign: Campaign) -> list[_Regimes]:
             )
             for group in GROUPS
         }
-        low, high = np.quantile(rows[GROUPS[0]], [0.025, 0.975]).tolist()
-        share = float(np.mean((rows[GROUPS[1]] >= low) & (rows[GROUPS[1]] <= high)))
-        if share < JUDGING.common_regime:
-            found.append(_Regimes(axis, unit, share, scale * low, scale * high))
-    return found
+        # Either may be the one that moved more.
+        both = []
+        for group, other in (GROUPS[::-1], GROUPS):
+            low, high = np.quantile(rows[other], [0.025, 0.975]).tolist()
+            share = float(np.mean((rows[group] >= low) & (rows[group] <= high)))
+            both.append(_Regimes(axis, unit, group, other, share, scale * low, scale * high))
+        found.append(min(both, key=lambda one: one.share))
+    return [one for one in found if one.share < JUDGING.common_regime]
 
 
 def smallest_note(judged: JudgedGroups) -> str:

@@ -17,6 +17,7 @@ from ferryid.diagnose.judging.disturbance_findings import disturbance_claims, ex
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.findings import force_claims
 from ferryid.diagnose.judging.signal_to_noise import velocity_noise_shares
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.judging.unexplained import Unexplained, find_unexplained
 from ferryid.effects import effects
 from ferryid.effects.wording import listed
@@ -77,8 +78,9 @@ def _judged(
     explained = over(lambda state: explained_by(log, stands.fit, state), states)
     progress("locating")
     baseline = log.estimated.baseline
-    # Beside the hull of other logs, forces need not stand out against the whole library.
-    library = () if baseline.joint else log.steady
+    # Beside the hull of several other logs, forces need not stand out against the whole library.
+    several = baseline.hull_known or baseline.hull_logs >= JUDGING.campaign_logs
+    library = () if baseline.joint and several else log.steady
     claims = (
         *sensor_claims(log.estimated.averaged.screened),
         *force_claims(problem, stands, measurements, library, hull_known=baseline.hull_known),
@@ -88,6 +90,7 @@ def _judged(
     figures = LogFigures(
         hull_known=baseline.hull_known,
         joint=baseline.joint,
+        hull_logs=baseline.hull_logs,
         velocity_noise=velocity_noise_shares(problem),
         unsteady=unknown.unsteady or bool(states),
         baseline_sensors=baseline.sensors,

@@ -288,7 +288,7 @@ def test_bursts_hints_and_what_is_fast_stand_in_for_nothing() -> None:
 def test_a_force_is_a_hint_where_only_the_log_itself_tells_of_the_hull(
     kind: Kind, known: bool, joint: bool, sure: bool
 ) -> None:
-    figures = LogFigures(hull_known=known, joint=joint)
+    figures = LogFigures(hull_known=known, joint=joint, hull_logs=3 if joint else 1)
     assert stands(hull_from_this_log, found("wind"), Context(Figures(kind), figures)) == sure
     assert stands(hull_from_this_log, found("wind"), Context(Figures(kind, sets_in=True), figures))
     assert stands(hull_from_this_log, found("wind"), Context(Figures(kind, beyond_hull=True), figures))
@@ -388,7 +388,8 @@ def test_what_all_logs_do_not_confirm_is_no_property_of_one(logs: int, weighed: 
 
 @pytest.mark.parametrize(("logs", "known", "sure"), [(2, False, False), (3, False, True), (2, True, True)])
 def test_a_force_beside_the_hull_of_one_other_log_is_a_hint(logs: int, known: bool, sure: bool) -> None:
-    figures = LogFigures(hull_known=known, joint=True, campaign=(frozenset[tuple[str, str | None]](),) * logs)
+    # However many of them are diagnosed: the hull may come from references.
+    figures = LogFigures(hull_known=known, joint=True, hull_logs=logs, campaign=(frozenset[tuple[str, str | None]](),))
     assert stands(hull_from_this_log, found("payload"), Context(Figures("force"), figures)) == sure
     # What sets in stands out against any hull, and what all logs share is judged with them.
     assert stands(hull_from_this_log, found("payload"), Context(Figures("force", sets_in=True), figures))

@@ -133,6 +133,12 @@ def test_two_logs_that_moved_unlike_beside_a_hull_of_their_own_confirm_no_differ
         return _of_regimes(in_groups(replace(campaign, hull=replace(campaign.hull, known=known)), names))
 
     assert "which moved unlike in surge, and may be off" in doubt(fast, known=False)
+    # Whichever of them is named first.
+    still = replace(second, windows=replace(second.windows, measurements=replace(seen, nu=0.2 * seen.nu)))
+    for pair in ((first, still), (still, first)):
+        campaign = replace(weakened(1.0), members=pair)
+        campaign = in_groups(replace(campaign, hull=replace(campaign.hull, known=False)), "AB")
+        assert "which moved unlike in surge, sway and yaw" in _of_regimes(campaign)
     # A hull that is known is so at either speed, and further logs of a group show by how much it scatters.
     assert doubt(fast, known=True) == ""
     assert doubt(fast, known=False, names="ABB") == ""
