@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite
+from math import inf, isfinite
 
 
 @dataclass(frozen=True)
@@ -16,9 +16,13 @@ class Estimate:
     unit: str
 
     @classmethod
-    def normal(cls, value: float, error: float, unit: str) -> Estimate:
-        """Return an estimate whose error is normal, with this standard deviation."""
-        return cls(value, value - 1.96 * error, value + 1.96 * error, unit)
+    def normal(cls, value: float, error: float, unit: str, lowest: float = -inf, highest: float = inf) -> Estimate:
+        """Return an estimate whose error is normal, with this standard deviation.
+
+        Its interval ends at the lowest and highest possible values, as no time constant is negative; the value is in it.
+        """
+        low, high = max(value - 1.96 * error, lowest), min(value + 1.96 * error, highest)
+        return cls(value, min(low, value), max(high, value), unit)
 
     @property
     def digits(self) -> int:

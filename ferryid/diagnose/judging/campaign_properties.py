@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence, Set
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from math import exp, inf
 
@@ -26,7 +26,7 @@ from ferryid.diagnose.judging.experiment_design import manoeuvre
 from ferryid.diagnose.judging.finding import Finding, Rival
 from ferryid.diagnose.judging.rivals import alike, redundant_shape
 from ferryid.diagnose.judging.thresholds import JUDGING
-from ferryid.effects.effect import HELD, Parameter
+from ferryid.effects.effect import HELD
 from ferryid.effects.wording import weak_evidence
 from ferryid.side_by_side import over
 from ferryid.types import AXES, Floats
@@ -220,7 +220,7 @@ def tested(made: CampaignFit, candidate: Candidate, rivals: Sequence[TriedProper
     value, error = _estimate(made, candidate)
     unreported = frozenset.intersection(*(effect.unreported(one, value) for one in seen))
     estimates = {
-        one.name: within_possible(one, float(at), float(e))
+        one.name: Estimate.normal(float(at), float(e), one.unit, one.low, one.high)
         for one, at, e in zip(candidate.parameters, value, error, strict=True)
         if one.name not in unreported and one.size > HELD
     }
@@ -241,12 +241,6 @@ def tested(made: CampaignFit, candidate: Candidate, rivals: Sequence[TriedProper
         logs=len(seen),
         hull_known=made.campaign.hull.known,
     )
-
-
-def within_possible(parameter: Parameter, value: float, error: float) -> Estimate:
-    """Return an estimate whose interval ends where its parameter does, as of a single log: no time constant is negative."""
-    made = Estimate.normal(value, error, parameter.unit)
-    return replace(made, low=min(value, max(made.low, parameter.low)), high=max(value, min(made.high, parameter.high)))
 
 
 def _out_of_step(made: CampaignFit, candidate: Candidate, without: CampaignFit) -> OutOfStep:

@@ -60,7 +60,8 @@ class HiddenGain:
 
     def says(self, signal: str) -> str:
         """Return it as a sentence."""
-        told = f"Held out over all {counted(self.logs, 'log')}, the {signal} as it was measured gains {_range(self.measured)}"
+        where = "Held out" if self.logs == 1 else f"Held out over all {counted(self.logs, 'log')}"
+        told = f"{where}, the {signal} as it was measured gains {_range(self.measured)}"
         estimated = f"the estimated one, steady in each log, {_range(self.estimated)}"
         if not isfinite(self.share):
             return f"{told}, which may be nothing, so that no share of it can be given; {estimated}."

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit
 from ferryid.diagnose.inference.profile_likelihood import intervals
@@ -15,13 +17,14 @@ def size_estimates(problem: EstimationProblem, kept: Fit, index: int) -> dict[st
     unreported = candidate.effect.unreported(problem.plain.measurements, kept.values[index])
     followed = intervals(problem, kept, index) if candidate.effect.profiled and not candidate.times else {}
     for parameter, value, spread in zip(candidate.parameters, kept.values[index].tolist(), error.tolist(), strict=True):
-        low, high = max(value - 1.96 * spread, parameter.low), min(value + 1.96 * spread, parameter.high)
+        made = Estimate.normal(value, spread, parameter.unit, parameter.low, parameter.high)
         if parameter.name in followed:
-            low, high = min(followed[parameter.name][0], value), max(followed[parameter.name][1], value)
+            low, high = followed[parameter.name]
+            made = replace(made, low=min(low, value), high=max(high, value))
         least = candidate.effect.minimum_change
         if parameter.name in unreported:
             continue
-        if least > 0.0 and low < parameter.neutral + least and high > parameter.neutral - least:
+        if least > 0.0 and made.low < parameter.neutral + least and made.high > parameter.neutral - least:
             continue
-        estimates[parameter.name] = Estimate(value, low, high, parameter.unit)
+        estimates[parameter.name] = made
     return estimates

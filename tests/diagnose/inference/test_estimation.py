@@ -16,7 +16,7 @@ from ferryid.diagnose.inference.noise_model import NoiseModel, stride_s
 from ferryid.diagnose.inference.weak_form import steps_of, windows
 from ferryid.effects import effects
 from ferryid.effects.effect import HELD, Effect, Parameter
-from ferryid.effects.force_model import ForceModel, Measurements, hull_of
+from ferryid.effects.force_model import ForceModel, Measurements, hull_of, moved_coefficient
 from ferryid.types import Floats
 from ferryid.vessel import load_profile
 
@@ -203,6 +203,30 @@ def test_slopes_by_the_hull_are_those_of_whitened_gaps(factors: tuple[float, flo
         hull[k] += 0.1 * spread[k]
         slope = (case.white(acted(replace(plain, hull=hull))) - case.white(acted(plain))) / 0.1
         np.testing.assert_allclose(found[:, k], slope, rtol=0.0, atol=1e-6 * np.abs(slope).max())
+
+
+@pytest.mark.slow
+def test_what_differs_in_one_coefficient_alone_is_worked_out_as_any_other() -> None:
+    case = problem(60.0)
+    plain, white = case.plain, case.white(case.plain)
+    n = len(plain.measurements.t)
+    heavier, weaker = plain.hull.copy(), plain.hull.copy()
+    heavier[0] *= 1.1
+    weaker[6:8] *= 1.2
+    hulls = [plain.replaced(hull=heavier), plain.replaced(hull=weaker)]
+    pushed = plain.replaced(external=np.full((n, 3), 30.0))
+    both = plain.replaced(hull=heavier, external=pushed.external)
+    assert [moved_coefficient(plain, one) for one in (*hulls, pushed, both, plain)] == [0, None, None, None, None]
+    # Equal arrays are the same, whoever made them.
+    assert moved_coefficient(plain, plain.replaced(hull=heavier, external=plain.external.copy())) == 0
+    others = [both, *hulls, pushed]
+    for begin in (plain, pushed):
+        there = case.white(begin)
+        expected = np.column_stack([case.white(one) - there for one in others])
+        found = case.changes(begin, others, there)
+        np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-9 * np.abs(white).max())
+    with pytest.raises(AssertionError, match="hul"):
+        plain.replaced(hul=heavier)
 
 
 @pytest.mark.slow

@@ -17,7 +17,7 @@ from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging import campaign_properties, conclude
 from ferryid.diagnose.judging.campaign_conditions import ConditionTest
 from ferryid.diagnose.judging.campaign_evidence import Gain, HeldOutLoss
-from ferryid.diagnose.judging.campaign_properties import PropertyTest, within_possible
+from ferryid.diagnose.judging.campaign_properties import PropertyTest
 from ferryid.diagnose.judging.claims import Claim, Figures, Kind, LogFigures
 from ferryid.diagnose.judging.confidence_rules import apply_rules
 from ferryid.diagnose.judging.credibility import (
@@ -414,12 +414,11 @@ def test_a_property_and_a_difference_that_are_not_credible_are_not_confirmed() -
 
 
 def test_an_interval_over_all_logs_ends_where_the_parameter_does() -> None:
-    lag = Parameter("time_constant", "s", 0.5, 0.0, 10.0)
-    assert within_possible(lag, 0.7, 1.0) == Estimate(0.7, 0.0, 0.7 + 1.96, "s")
-    assert within_possible(lag, 9.5, 1.0) == Estimate(9.5, 9.5 - 1.96, 10.0, "s")
-    assert within_possible(lag, 5.0, 1.0) == Estimate.normal(5.0, 1.0, "s")
+    assert Estimate.normal(0.7, 1.0, "s", 0.0, 10.0) == Estimate(0.7, 0.0, 0.7 + 1.96, "s")
+    assert Estimate.normal(9.5, 1.0, "s", 0.0, 10.0) == Estimate(9.5, 9.5 - 1.96, 10.0, "s")
+    assert Estimate.normal(5.0, 1.0, "s", 0.0, 10.0) == Estimate.normal(5.0, 1.0, "s")
     # A value beyond what is possible stays in its interval, and is judged for it.
-    assert within_possible(lag, -0.2, 0.05).low == -0.2
+    assert Estimate.normal(-0.2, 0.05, "s", 0.0, 10.0).low == -0.2
 
 
 def taught(hull: Any = None, doubt: str = "") -> Diagnosis:

@@ -31,6 +31,11 @@ def test_the_share_is_of_what_was_measured_with_its_interval() -> None:
         "Held out over all 3 logs, the wind as it was measured gains +20 nat (+18 to +23); the estimated one, steady in each "
         "log, +10 nat (+9 to +12): 50 % of it (50 to 50 %)."
     )
+    assert (
+        HiddenGain.of(0.5 * BLOCKS, BLOCKS, 1)
+        .says("wind")
+        .startswith("Held out, the wind as it was measured gains +20")
+    )
     assert half.to_json()["share"] == {"value": half.share, "low": half.low, "high": half.high}
     scattered = HiddenGain.of(np.array([5.0, 0.0, 4.0, 1.0]), BLOCKS, 3)
     assert scattered.low < scattered.share < scattered.high
