@@ -10,7 +10,7 @@ from pathlib import Path
 from ferryid.draft.actuator_fields import actuator_fields, constant, parted, shared_topics
 from ferryid.draft.actuators import UNKNOWN_ORDER, DraftedActuator, drafted_actuators
 from ferryid.draft.autopilots import Orders, autopilot_fields, autopilot_groups, changing, orders, with_frames
-from ferryid.draft.fields import ORDERS, FieldGroup, navigation_groups
+from ferryid.draft.fields import FieldGroup, navigation_groups, speeds_ahead
 from ferryid.draft.guessed_orders import guessed_orders
 from ferryid.draft.kinematics import navigation_signals
 from ferryid.draft.mapped import MappedSignal
@@ -28,11 +28,6 @@ from ferryid.vessel.profile import Profile
 from ferryid.vessel.thrusters import needed_roles
 
 FRAME_ID = "header.frame_id"
-_AHEAD = frozenset({"u", "surge", "speed", "spd", "sog", "stw", "vel", "velocity"})
-_OTHER_SPEEDS = frozenset(
-    {"air", "angular", "current", "down", "engine", "heave", "motor", "prop", "propeller", "rate", "rudder", "sway"}
-    | {"thruster", "turn", "vertical", "wind", "yaw"}
-)
 
 
 @dataclass(frozen=True)
@@ -182,18 +177,12 @@ def _no_way(signals: Sequence[MappedSignal], topics: Sequence[Topic]) -> tuple[s
         return ()
     mapped = {(one.topic, field) for one in signals for field in one.fields}
     speeds = [
-        (topic.name, path)
-        for topic in topics
-        for path in topic.fields
-        if set(words_of(path)) & _AHEAD
-        and not set(words_of(path)) & (ORDERS | _OTHER_SPEEDS)
-        and (topic.name, path) not in mapped
+        (topic.name, path) for topic in topics for path in speeds_ahead(topic) if (topic.name, path) not in mapped
     ]
     told = "no position and no velocity is mapped, of which a fit needs one"
     if not speeds:
         return (f"{told}, and no field has a name of either",)
-    # That with the fewest other words in its name.
-    topic, field = min(speeds, key=lambda one: len(set(words_of(one[1])) - _AHEAD))
+    topic, field = speeds[0]
     return (
         f'{told}: if "{field}" is the speed ahead, map it as surge alone, [signals.velocity] with topic = "{topic}", '
         f'fields = ["{field}"], unit = "m/s" and frame = "FRD"',

@@ -86,6 +86,8 @@ RATES = frozenset(
     {"angular", "gyro", "gyr", "gyroscope", "omega", "rates", "angvelo", "rate", "angvel", "yawrate", "zgyro"}
 )
 HEADING = frozenset({"heading", "hdg", "yaw", "psi", "compass", "hdt"})
+_AHEAD = SPEEDS | {"u", "surge", "spd", "sog", "stw"}
+_OTHER_SPEEDS = frozenset({"wind", "air", "vertical", "down", "heave", "sway", "turn"})
 _QUATERNION = frozenset({"orientation", "rotation", "quaternion", "heading", "attitude"})
 ACTUATORS = frozenset(
     [
@@ -184,6 +186,14 @@ def numeric_fields(topic: Topic) -> dict[str, tuple[str, ...]]:
         if kind.startswith(_NUMBERS) and (topic.lists_elements or not path.endswith("]")):
             found[path] = words_of(path)
     return found
+
+
+def speeds_ahead(topic: Topic) -> list[str]:
+    """Return the fields of a topic that may be the speed ahead by their names, those with the fewest other words first."""
+    others = ORDERS | RATES | HEADING | ACTUATORS | _NO_MEASUREMENT | _OTHER_SPEEDS
+    fields = {path: set(words) for path, words in numeric_fields(topic).items()}
+    found = [path for path, words in fields.items() if words & _AHEAD and not words & others]
+    return sorted(found, key=lambda path: len(fields[path] - _AHEAD))
 
 
 def span_of(topic: Topic) -> float:
