@@ -41,7 +41,7 @@ from ferryid.files import alone, dump_json, remove_abandoned, resolved, write_te
 from ferryid.ingest import open_log
 from ferryid.ingest.hashing import content_hash
 from ferryid.models import Model, model_to_json
-from ferryid.report.batch_findings import found_in, losses_in
+from ferryid.report.batch_findings import copies_in, found_in, losses_in
 from ferryid.report.batch_page import render, timelines
 from ferryid.report.batch_rows import BatchResult, Change, MemoryUse
 from ferryid.report.diagnosis_report import patient
@@ -357,6 +357,8 @@ def render_batch(result: BatchResult) -> str:
     lines = [f"{counted(counts['logs'], 'log')}: {counts[DONE]} done{''.join(f', {one}' for one in bad)}"]
     if damaged := losses_in(result.rows):
         lines.append(f"  {damaged}")
+    if copies := copies_in(result.rows):
+        lines.append(f"  {copies}")
     verdicts = Counter(row.diagnose.verdict for row in result.rows if row.diagnose)
     if verdicts:
         lines.append("  " + ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in sorted(verdicts.items())))

@@ -8,7 +8,7 @@ from pathlib import PurePath
 
 from ferryid.counts import counted
 from ferryid.diagnose import JUDGING, UNKNOWN, Estimate
-from ferryid.effects.wording import uncapitalised
+from ferryid.effects.wording import listed, uncapitalised
 from ferryid.report.batch_rows import FindingSummary, SummaryRow
 from ferryid.report.diagnosis_words import sized, title
 
@@ -35,6 +35,17 @@ def losses_in(rows: Sequence[SummaryRow]) -> str:
         return ""
     more = f" and {len(damaged) - NAMED} more" if len(damaged) > NAMED else ""
     return f"{counted(len(damaged), 'log')} damaged, of which some is lost: {', '.join(damaged[:NAMED])}{more}"
+
+
+def copies_in(rows: Sequence[SummaryRow]) -> str:
+    """Return which logs hold the same recording byte by byte, each of which counts for itself. Empty without."""
+    names: dict[str, list[str]] = {}
+    for row in rows:
+        if row.sha256:
+            names.setdefault(row.sha256, []).append(PurePath(row.log).name)
+    same = [f"{one[0]} ({listed(one[1:])})" for one in names.values() if len(one) > 1]
+    more = f" and {len(same) - NAMED} more" if len(same) > NAMED else ""
+    return f"the same recording under further names, each counted: {', '.join(same[:NAMED])}{more}" if same else ""
 
 
 def is_damaged(row: SummaryRow) -> bool:

@@ -15,7 +15,7 @@ from urllib.parse import quote
 from ferryid.counts import counted
 from ferryid.diagnose import JUDGING
 from ferryid.report import batch_figures
-from ferryid.report.batch_findings import found_in, is_damaged, losses_in, sized_name
+from ferryid.report.batch_findings import copies_in, found_in, is_damaged, losses_in, sized_name
 from ferryid.report.batch_rows import (
     BatchResult,
     EvaluationSummary,
@@ -134,6 +134,7 @@ def render(result: BatchResult, interactive: Interactive = STATIC) -> str:
         headline=_headline(counts),
         counts=[(WORDS[name], counts[name]) for name in WORDS if counts[name] and counts["logs"] != counts[name]],
         damaged=losses_in(result.rows),
+        copies=copies_in(result.rows),
         found=found_in(result.rows),
         verdicts=sorted(Counter(row.verdict for row in rows if row.verdict).items()),
         accepted=Counter(row.fit for row in rows if row.fit),

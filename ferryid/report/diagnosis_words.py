@@ -82,7 +82,8 @@ def headline(diagnosis: Diagnosis) -> str:
     """Return the verdict in one sentence."""
     every = [one for one in diagnosis.findings if one.effect != UNKNOWN]
     named = [one for one in every if one.sure]
-    doubtful = listed([uncapitalised(title(one.effect, one.instance)) for one in every if one not in named])
+    hints = [uncapitalised(title(one.effect, one.instance)) for one in every if one not in named]
+    doubtful = listed(list(dict.fromkeys(hints)))
     physics = [_sure_name(one) for one in named if one.effect in effects()]
     faulty = [one for one in named if _of_sensor(one)]
     sensors = _faults(faulty, [uncapitalised(title(one.effect)) for one in faulty])

@@ -61,9 +61,13 @@ def mirrored(eta: Floats, nu: Floats, usable: NDArray[np.bool_], rate_hz: float)
     free = np.column_stack([np.ones(len(starts)), pointing[starts + span] - pointing[starts]])
     fits = {name: _fit(way, _summed(values, starts, span), free) for name, values in every.items()}
     best = max(fits, key=lambda name: fits[name])
-    if fits[best] < SIGNALS.mirror_correlation or SIGNALS.mirror_ratio * (1.0 - fits[best] ** 2) > 1.0 - fits[""] ** 2:
+    declared = fits[""]
+    # What is declared may be exact, as in a track that was made from the velocities.
+    if best == "" or fits[best] < SIGNALS.mirror_correlation:
         return "", ""
-    return best, f"{SAYS[best]} (correlation {fits[best]:.2f} so, {fits['']:.2f} as declared)."
+    if SIGNALS.mirror_ratio * (1.0 - fits[best] ** 2) > 1.0 - declared**2:
+        return "", ""
+    return best, f"{SAYS[best]} (correlation {fits[best]:.2f} so, {declared:.2f} as declared)."
 
 
 @dataclass(frozen=True)

@@ -355,7 +355,13 @@ def _within(measured: Measured, half: int) -> Flags:
         valid[stretch.start + half : max(stretch.start + half, stretch.stop - half)] = True
     if not valid.any():
         longest = longest_stretch_s(measured)
-        needed = (2 * half + 1) / measured.rate_hz
+        needed, whole = (2 * half + 1) / measured.rate_hz, len(usable) / measured.rate_hz
+        if whole >= needed:
+            raise FerryIdError(
+                f"{measured.log}: no stretch in which all signals are measured is as long as the smoothing window, found "
+                f"{longest:.2f} s unbroken of {whole:.0f} s where {needed:.2f} s are needed. Fix: see with ferryid inspect "
+                "which signals are missing, and map others, or use a shorter --window"
+            )
         raise FerryIdError(
             f"{measured.log}: log shorter than the smoothing window, found {longest:.2f} s unbroken where "
             f"{needed:.2f} s are needed. Fix: use a longer log or a shorter --window"

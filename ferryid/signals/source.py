@@ -88,8 +88,9 @@ def sources_of(stream: Stream) -> tuple[Source, ...]:
     """Clean a stream: one source, and more where columns have values at rates of their own; see `at_own_rates`."""
     sources = []
     for part in at_own_rates(stream):
-        source = source_of(part)
-        if part.time_ns.size < stream.time_ns.size:
+        merged = part.time_ns.size < stream.time_ns.size
+        source = source_of(part, merged=merged)
+        if merged:
             said = (
                 f"{stream.topic}: {', '.join(part.columns)} {'has' if len(part.columns) == 1 else 'have'} a value in "
                 f"{part.time_ns.size} of {counted(stream.time_ns.size, 'row')}, "
@@ -104,7 +105,7 @@ def at_own_rates(stream: Stream) -> tuple[Stream, ...]:
     """Return a stream in parts, each of the columns that have their values in the same rows, at the times of these.
 
     A table that several sensors were merged into has rows in which others than the one that was read have no value. A column
-    of which two values usually lie two rows apart or more, at regular times, is one of these; so is an order, which may be
+    of which hardly any two values lie on neighbouring rows is one of these; so is an order that some rows lack, as it may be
     written when it changes. Other columns stay together, whatever they lack: a sensor that fails has gaps.
     """
     time_s = np.asarray((stream.time_ns - stream.time_ns[:1]) * 1e-9, dtype=np.float64)
@@ -133,21 +134,21 @@ def at_own_rates(stream: Stream) -> tuple[Stream, ...]:
 def _at_own_rate(name: str, finite: Flags, time_s: Floats) -> bool:
     """Return whether a column with values on some rows, shape (n,), has them at a rate of its own."""
     rows = np.flatnonzero(finite)
-    if not 1 < rows.size < finite.size or np.median(np.diff(rows)) < SIGNALS.rows_apart:
+    if not 1 < rows.size < finite.size:
         return False
     if is_order(name):
         return True
-    apart_s = np.diff(time_s[rows])
-    usual_s = float(np.median(apart_s))
-    low, high = SIGNALS.regular_range
-    regular = float(np.mean((apart_s > low * usual_s) & (apart_s < high * usual_s)))
-    # The weather may be noted once a minute, and the motion of no vessel.
-    often = usual_s <= SIGNALS.slowest_sensor_s or name.startswith(_WEATHER)
-    return often and regular >= SIGNALS.regular_share
+    # Of a sensor that fails, values are left on neighbouring rows too.
+    own = float(np.quantile(np.diff(rows), SIGNALS.neighbouring_share)) >= SIGNALS.rows_apart
+    slowest_s = SIGNALS.slowest_weather_s if name.startswith(_WEATHER) else SIGNALS.slowest_sensor_s
+    return own and float(np.median(np.diff(time_s[rows]))) <= slowest_s
 
 
-def source_of(stream: Stream) -> Source:
-    """Take implausible, stale and stuck samples out of a stream, and find what counts as a gap in it."""
+def source_of(stream: Stream, *, merged: bool = False) -> Source:
+    """Take implausible, stale and stuck samples out of a stream, and find what counts as a gap in it.
+
+    `merged` is True of columns that other rows of their table lack.
+    """
     time_ns = np.asarray(stream.time_ns)
     time_s = (time_ns - time_ns[0]) * 1e-9
     period = _usual_period(time_s)
@@ -180,7 +181,9 @@ def source_of(stream: Stream) -> Source:
                 f"{verb(int(same.sum()), 'repeats')} an old one to the last digit for more "
                 f"than {frozen:.2f} s; taken as missing."
             )
-    unchanged = _on_change(time_s, stream.columns)
+    # Rows of a table without an order are no gap of it where each order that is written is another one.
+    written = merged and all(is_order(name) for name in stream.columns) and _says_new(stream.columns)
+    unchanged = written or _on_change(time_s, stream.columns)
     interval = np.diff(time_s)
     gaps = interval > bridge
     if interval.size and all(is_load(name) for name in columns):
@@ -248,7 +251,10 @@ def _on_change(time_s: Floats, columns: Mapping[str, Floats]) -> bool:
         return False
     interval = np.diff(time_s)
     irregular = float(np.mean(interval > SIGNALS.gap_periods * np.median(interval)))
-    new = np.zeros(interval.size, dtype=bool)
-    for values in columns.values():
-        new |= np.diff(values) != 0.0
-    return irregular > SIGNALS.irregular_share and float(new.mean()) > SIGNALS.new_share
+    return irregular > SIGNALS.irregular_share and _says_new(columns)
+
+
+def _says_new(columns: Mapping[str, Floats]) -> bool:
+    """Return whether (nearly) every message says something else than the one before."""
+    new = np.any([np.diff(values) != 0.0 for values in columns.values()], axis=0)
+    return new.size > 0 and float(new.mean()) > SIGNALS.new_share

@@ -23,26 +23,23 @@ class SignalThresholds:
     rows_apart: float = threshold(
         2.0,
         "rows",
-        "usual distance of the values of a column of a table from which the rows between are other sensors'",
+        "distance of the values of a column of a table from which the rows between are other sensors'",
         "derived: another sensor of the same rate has the rows between",
     )
-    regular_range: tuple[float, ...] = threshold(
-        (0.6, 1.6),
-        "of the usual",
-        "distances between the values of such a column that count as regular",
-        "derived: a sensor of 4 Hz has values two and three rows of 10 Hz apart",
-    )
-    regular_share: float = threshold(
-        0.6,
-        "of the distances",
-        "that are regular at least where a column has a rate of its own",
-        "derived: where values are lost at random, less than half are",
+    neighbouring_share: float = threshold(
+        0.1,
+        "of the values",
+        "that may lie on neighbouring rows where a column has a rate of its own",
+        "convention: all but a few; of values lost at random in nine rows of ten it is as many",
     )
     slowest_sensor_s: float = threshold(
         10.0,
         "s",
         "usual distance from which on the values of a column are what is left of a sensor that fails",
         "convention: slow receivers and logs report the motion every ten seconds",
+    )
+    slowest_weather_s: float = threshold(
+        60.0, "s", "the same of wind and current", "convention: stations report the wind every minute"
     )
     stuck_periods: float = threshold(
         10.0,

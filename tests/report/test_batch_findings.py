@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ferryid.report.batch_findings import found_in, losses_in
+from ferryid.report.batch_findings import copies_in, found_in, losses_in
 from tests.batch.rows import finding, row
 
 
@@ -30,3 +30,9 @@ def test_logs_that_are_not_whole_are_named_though_they_are_done() -> None:
     many = [row(f"{k}.mcap", lost={**whole, "unknown": True}) for k in range(7)]
     assert losses_in(many) == "7 logs damaged, of which some is lost: 0.mcap, 1.mcap, 2.mcap, 3.mcap, 4.mcap and 2 more"
     assert losses_in(rows[1:]) == ""
+
+
+def test_a_recording_under_two_names_is_told() -> None:
+    rows = [row("trials/a.mcap"), row("b.mcap", 2), row("copy/twin.mcap"), row("third.mcap")]
+    assert copies_in(rows) == "the same recording under further names, each counted: a.mcap (twin.mcap and third.mcap)"
+    assert copies_in(rows[:2]) == ""

@@ -220,3 +220,16 @@ def test_what_could_not_be_read_is_said_with_the_sum_first() -> None:
     log = Path(__file__).resolve().parents[2] / "fixtures" / "truncated.mcap"
     prepared = smoothed(open_track(str(log), FERRY, None), 1.0)
     assert any("may be lost" in said or "could not be read" in said for said in prepared.left_out)
+
+
+def test_a_track_that_was_made_from_the_velocities_is_not_mirrored() -> None:
+    """A correlation of one and a bit, by rounding, ended in a KeyError."""
+    for seed in range(20):
+        random, rate = np.random.default_rng(seed), 10.0
+        n = 6000
+        nu = np.column_stack([1.0 + 0.1 * random.standard_normal(n), 0.1 * random.standard_normal(n)])
+        psi = np.cumsum(0.01 * random.standard_normal(n))
+        way = (nu[:, 0] + 1j * nu[:, 1]) * np.exp(1j * psi) / rate
+        place = np.concatenate([[0.0], np.cumsum(way)[:-1]])
+        eta = np.column_stack([place.real, place.imag, psi])
+        assert mirrored(eta, nu, np.ones(n, dtype=bool), rate) == ("", "")

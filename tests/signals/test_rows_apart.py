@@ -143,6 +143,40 @@ def test_two_sensors_of_one_rate_are_taken_apart_wherever_the_log_begins(first: 
     assert [sorted(one.columns) for one in faults.sources] == [["psi", "r", "u", "v"], sorted(thrusters(rows_s))]
 
 
+@pytest.mark.parametrize("missed", [0.1, 0.3, 0.5])
+def test_fixes_that_are_missed_at_random_leave_the_others(missed: float) -> None:
+    """Half of the fixes of 1 Hz in rows of 10 Hz: the log was said to have no position."""
+    kept = np.flatnonzero(np.random.default_rng(2).random(120) < missed)
+    found = find_faults(merged(10, skipped=tuple(kept.tolist())))
+    assert ["x", "y"] in [sorted(one.columns) for one in found.sources]
+
+
+def test_a_wind_of_two_values_in_minutes_is_missing() -> None:
+    t = ROWS_S
+    wind = {"wind_speed": 3.0 + 0.01 * t, "wind_from": 0.1 + 0.001 * t}
+    rare = {name: np.where(np.isin(np.arange(t.size), [5, 1190]), one, np.nan) for name, one in wind.items()}
+    slow = {name: np.where(np.arange(t.size) % 300 == 0, one, np.nan) for name, one in wind.items()}
+    every = {**motion(t), "psi": heading(t)}
+    # A station notes the wind each half minute.
+    assert len(find_faults(recording(stream("table", t, {**every, **slow}))).sources) == 2
+    faults = find_faults(recording(stream("table", t, {**every, **rare})))
+    assert len(faults.sources) == 1
+    assert any("wind_speed: 1198 of 1200 samples are missing" in said for said in faults.taken_out)
+
+
+@pytest.mark.parametrize("coarse", [False, True])
+def test_an_order_holds_however_often_it_changes(coarse: bool) -> None:
+    """Of changes in neighbouring rows most of the log was lost, of the same order in coarser steps nothing."""
+    t = ROWS_S
+    order = np.round(200.0 * np.sin(0.3 * t), -1 if coarse else 0)
+    told = np.r_[True, np.diff(order) != 0.0]
+    assert (np.median(np.diff(np.flatnonzero(told))) >= 2.0) == coarse
+    orders = {name: np.where(told, order, np.nan) for name in ("n_cmd_thruster1", "n_cmd_thruster2")}
+    angles = {name: values for name, values in thrusters(t).items() if name.startswith("alpha")}
+    track = align(recording(stream("table", t, {**place(t), "psi": heading(t), **orders, **angles})), PROFILE)
+    assert track.valid[5:-5].all()
+
+
 def test_an_order_that_was_written_before_a_range_holds_in_it() -> None:
     t = ROWS_S
     told = np.isin(np.arange(t.size), [0, 31, 800])

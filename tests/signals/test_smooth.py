@@ -316,6 +316,11 @@ def test_the_kalman_window_is_never_below_the_one_asked_for() -> None:
 def test_too_short_a_log_and_unknown_smoothers_are_refused() -> None:
     with pytest.raises(FerryIdError, match=r"trial: log shorter than the smoothing window, found 0\.90 s .*Fix: "):
         smoothed(trial(18), 1.0)
+    gappy = trial(400)
+    with pytest.raises(
+        FerryIdError, match=r"as long as the smoothing window, found 0\.\d+ s unbroken of 20 s .* inspect"
+    ):
+        smoothed(replace(gappy, valid=np.arange(400) % 10 > 0), 1.0)
     with pytest.raises(FerryIdError, match=r'no smoother called "sqare". Did you mean "square"\?'):
         smoothed(trial(), 1.0, "sqare")
 

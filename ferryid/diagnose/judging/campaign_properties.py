@@ -21,7 +21,15 @@ from ferryid.diagnose.inference.group_differences import compare_estimated, scat
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.campaign_evidence import Gain, held_out_loss
-from ferryid.diagnose.judging.credibility import felt, idle_in_campaign, interval_doubt, unfelt, value_doubt, worsened
+from ferryid.diagnose.judging.credibility import (
+    felt,
+    idle_in_campaign,
+    interval_doubt,
+    scaled_as_masses,
+    unfelt,
+    value_doubt,
+    worsened,
+)
 from ferryid.diagnose.judging.experiment_design import manoeuvre
 from ferryid.diagnose.judging.finding import Finding, Rival
 from ferryid.diagnose.judging.rivals import alike, redundant_shape
@@ -261,10 +269,10 @@ def _credibility(made: CampaignFit, candidate: Candidate, estimates: Mapping[str
         return doubt
     if doubt := interval_doubt(candidate.parameters, estimates, _covariance(made, candidate)):
         return doubt
-    scaled = {one.instance for one in made.campaign.properties if one.effect.scales}
-    if candidate.effect.scales and not made.campaign.hull.known and scaled >= {one.name for one in profile.actuators}:
-        all_of_them = "the only actuator" if len(scaled) == 1 else "all actuators, and each of them has one"
-        return f"without a hull model, a factor on the masses and the damping does the same as one on {all_of_them}"
+    if candidate.effect.scales and not made.campaign.hull.known:
+        scaled = {one.instance for one in made.campaign.properties if one.effect.scales}
+        if doubt := scaled_as_masses(scaled, profile):
+            return doubt
     without = made.common.copy()
     without[property_rows(made.campaign, candidate)] = 0.0
     return unfelt(felt(made, without, made.own).max(axis=0))

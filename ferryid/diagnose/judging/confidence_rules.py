@@ -446,14 +446,16 @@ def not_of_all_logs(finding: Finding, context: Context, _threshold: float) -> Ou
 
 @rule()
 def begins_as_no_event(finding: Finding, context: Context, _threshold: float) -> Outcome:
-    """Lower a property of the vessel in a part of one log of a campaign, unless it stands out there as an event.
+    """Lower a property or a load of the vessel in a part of one log of a campaign, unless it stands out there as an event.
 
     A hull that is known from the logs alone is known as far as all manoeuvres go on average. In those of a part of one log it
     may be off, and a force that is weaker there is one way of saying so; see `ferryid.diagnose.judging.onset_evidence`.
     """
     log, known = context.log, effects().get(finding.effect)
     begins = finding.onset_s is not None or finding.offset_s is not None
-    of_vessel = context.own.kind == "force" and known is not None and known.vessel
+    # A load is what the hull's masses say too; wind and current are each log's own.
+    of_hull = known is not None and (known.vessel or (known.changes_hull and not known.of_log))
+    of_vessel = context.own.kind == "force" and of_hull
     if log.hull_known or not log.joint or not of_vessel or not begins or context.own.sets_in:
         return finding, ""
     return _because(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
 from math import isfinite, log
 
@@ -170,6 +170,17 @@ def value_doubt(effect: Effect, parameters: Sequence[Parameter], values: Mapping
         if one.name in values and one.at_bound(values[one.name]):
             return f"its {one.name.replace('_', ' ')} of {values[one.name]:.3g} {one.unit} stands at the bound of its search"
     return ""
+
+
+def scaled_as_masses(scaled: Set[str | None], profile: Profile) -> str:
+    """Return that a factor on the masses and the damping does the same as those on actuators, as the end of a sentence.
+
+    Empty where some actuator has none. `scaled` are the actuators with one, beside a hull that nobody modelled.
+    """
+    if not scaled >= {one.name for one in profile.actuators}:
+        return ""
+    all_of_them = "the only actuator" if len(scaled) == 1 else "all actuators, and each of them has one"
+    return f"without a hull model, a factor on the masses and the damping does the same as one on {all_of_them}"
 
 
 def interval_doubt(

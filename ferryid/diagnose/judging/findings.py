@@ -24,7 +24,7 @@ from ferryid.diagnose.inference.folds import block_s
 from ferryid.diagnose.inference.onset_estimation import lasts_s, replace_candidate
 from ferryid.diagnose.judging.backward_elimination import Elimination
 from ferryid.diagnose.judging.claims import Claim, Figures
-from ferryid.diagnose.judging.credibility import idle_actuators, interval_doubt, value_doubt
+from ferryid.diagnose.judging.credibility import idle_actuators, interval_doubt, scaled_as_masses, value_doubt
 from ferryid.diagnose.judging.experiment_design import manoeuvre
 from ferryid.diagnose.judging.figure_data import figure_columns, figure_regressor
 from ferryid.diagnose.judging.finding import Finding, Rival
@@ -127,6 +127,9 @@ def _force_claim(
         beyond = proof.improvement.score_low > feedback_of(problem, kept).high
         figures = replace(figures, beyond_feedback=beyond)
     if not hull_known:
+        lasting = {one.instance for one in kept.candidates if one.effect.scales and not one.times}
+        if candidate.effect.scales and not candidate.times:
+            figures = replace(figures, doubt=figures.doubt or scaled_as_masses(lasting, measurements.profile))
         figures = replace(
             figures,
             sets_in=sets_in(problem, kept, i),

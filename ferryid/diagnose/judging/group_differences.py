@@ -36,7 +36,7 @@ from ferryid.diagnose.judging.group_loads import LoadDifference, load_difference
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
 from ferryid.effects.effect import Effect
-from ferryid.effects.wording import listed, uncapitalised, weak_evidence
+from ferryid.effects.wording import ALL_THRUSTERS, listed, uncapitalised, weak_evidence
 from ferryid.side_by_side import over
 from ferryid.vessel.circumstances import Circumstances
 from ferryid.vessel.profile import Profile
@@ -211,6 +211,12 @@ def _doubt(one: Difference, effect: Effect, hull_known: bool, profile: Profile) 
         return doubt
     if not _excludes(one):
         return "no interval excludes that there is none"
+    every = one.instance == ALL_THRUSTERS or len(profile.actuators) == 1
+    if effect.scales and every and min(low for low, _ in ends.values()) < JUDGING.idle_share:
+        return (
+            f"the motion of group {one.group} may not follow its recorded force at all, as where actuators were not engaged "
+            "in some of its logs"
+        )
     if effect.id in OF_HULL and not hull_known:
         return "the damping that it multiplies is known from the same logs only"
     return ""

@@ -408,6 +408,10 @@ def test_a_weak_thruster_in_a_part_of_one_log_is_no_event_where_the_logs_bring_t
     # Nor is that asked of what all logs share, of conditions, beside a hull that is known, or of one log: it has its own rule.
     assert stands(begins_as_no_event, replace(weak, onset_s=None), Context(Figures("force"), joint))
     assert stands(begins_as_no_event, replace(found("wind"), onset_s=6.0), Context(Figures("force"), joint))
+    # A load is masses of the hull, which may be off there.
+    loaded = replace(found("payload"), onset_s=248.0, offset_s=424.0)
+    assert not stands(begins_as_no_event, loaded, Context(Figures("force"), joint))
+    assert stands(begins_as_no_event, loaded, Context(Figures("force", sets_in=True), joint))
     assert stands(begins_as_no_event, weak, Context(Figures("force"), replace(joint, hull_known=True)))
     assert stands(begins_as_no_event, weak, Context(Figures("force"), replace(joint, joint=False)))
 

@@ -28,6 +28,7 @@ from ferryid.diagnose.judging.credibility import (
     impossible_masses,
     interval_doubt,
     refitted_hull,
+    scaled_as_masses,
     unfelt,
     value_doubt,
 )
@@ -41,6 +42,7 @@ from ferryid.effects import effects
 from ferryid.effects.effect import Parameter
 from ferryid.effects.force_model import COEFFICIENTS, ForceModel, Measurements, hull_of
 from ferryid.effects.thresholds import EFFECTS
+from ferryid.effects.wording import ALL_THRUSTERS
 from ferryid.models import Quantity, Source, StoredEffect
 from ferryid.types import AXES
 from ferryid.vessel import load_profile
@@ -411,6 +413,17 @@ def test_a_property_and_a_difference_that_are_not_credible_are_not_confirmed() -
     gain = Gain(40.0, 10.0, 70.0)
     apart = replace(Difference.of(weak, bound, 50.0, 0.0, {}), gain=gain, by_group={"A": gain, "B": gain})
     assert _doubt(apart, weak.effect, True, FERRY) == "its factor of 2.99 - stands at the bound of its search"
+    # One thruster may give nothing; where none does, none was engaged.
+    idle = replace(apart, estimates={"factor": Estimate(0.13, 0.0, 0.26, "-")})
+    assert _doubt(idle, weak.effect, True, FERRY) == ""
+    every = _doubt(replace(idle, instance=ALL_THRUSTERS), weak.effect, True, FERRY)
+    assert every.startswith(f"the motion of group {idle.group} may not follow its recorded force at all")
+
+
+def test_factors_on_all_actuators_are_one_on_the_masses() -> None:
+    assert scaled_as_masses({"thruster1"}, FERRY) == ""
+    assert "all actuators, and each of them has one" in scaled_as_masses({"thruster1", "thruster2"}, FERRY)
+    assert scaled_as_masses({"propeller"}, load_profile("kvlcc2-model")).endswith("as one on the only actuator")
 
 
 def test_an_interval_over_all_logs_ends_where_the_parameter_does() -> None:
