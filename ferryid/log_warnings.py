@@ -43,9 +43,35 @@ def log_warnings(told: Sequence[tuple[str, Sequence[str]]]) -> tuple[str, ...]:
 
 
 def _ranged(shape: str, sentences: Sequence[str]) -> str:
-    """Return sentences of one shape as one, with the least and the most of each number that differs."""
-    text = shape
-    for values in zip(*(NUMBER.findall(one) for one in sentences), strict=True):
-        least, most = (end(values, key=lambda value: float(value.replace(",", ""))) for end in (min, max))
-        text = text.replace(PLACE, least if least == most else f"{least} to {most}", 1)
+    """Return sentences of one shape as one, with the least and the most of each number that differs.
+
+    Intervals, ``"1 to 2"``, become the one that holds them all.
+    """
+    columns = list(zip(*(NUMBER.findall(one) for one in sentences), strict=True))
+    text, known = "", 0
+    for part in re.split(f"({PLACE} to {PLACE}|{PLACE})", shape):
+        if part == PLACE:
+            text += _range(columns[known])
+        elif part == f"{PLACE} to {PLACE}":
+            text += _hull(columns[known], columns[known + 1])
+        else:
+            text += part
+        known += part.count(PLACE)
     return text
+
+
+def _value(number: str) -> float:
+    return float(number.replace(",", ""))
+
+
+def _range(numbers: Sequence[str]) -> str:
+    """Return the least and the most of numbers as they were written, or the only one."""
+    least, most = min(numbers, key=_value), max(numbers, key=_value)
+    return least if least == most else f"{least} to {most}"
+
+
+def _hull(starts: Sequence[str], ends: Sequence[str]) -> str:
+    """Return intervals, or changes from one number to another, as the one that holds them all."""
+    if all(_value(start) <= _value(end) for start, end in zip(starts, ends, strict=True)):
+        return f"{min(starts, key=_value)} to {max(ends, key=_value)}"
+    return f"({_range(starts)}) to ({_range(ends)})"

@@ -24,3 +24,17 @@ def test_what_two_logs_have_or_what_differs_by_a_name_or_a_time_stays_of_each() 
     assert log_warnings(named) == tuple(f"{name}: {one}" for name, (one,) in named)
     timed = [(name, [f"It begins at 10:4{name}:10."]) for name in "123"]
     assert log_warnings(timed) == tuple(f"{name}: {one}" for name, (one,) in timed)
+
+
+def test_intervals_of_several_logs_become_the_one_that_holds_them_all() -> None:
+    def told(*said: str) -> str:
+        (one,) = log_warnings([(str(i), [sentence]) for i, sentence in enumerate(said)])
+        return one
+
+    slopes = [
+        f"The slope is {one} times it, 99 % interval {low} to {high}, of 7 to 8."
+        for one, low, high in (("3.48", "2.00", "5.01"), ("2.85", "1.65", "4.00"), ("3.00", "2.49", "7.11"))
+    ]
+    assert told(*slopes) == "3 logs: The slope is 2.85 to 3.48 times it, 99 % interval 1.65 to 7.11, of 7 to 8."
+    # A fall is no interval.
+    assert told("It fell, 9 to 4.", "It fell, 8 to 3.", "It fell, 7 to 6.") == "3 logs: It fell, (7 to 9) to (3 to 6)."

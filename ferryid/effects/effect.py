@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import inf, isfinite
+from math import inf, isfinite, log
 from types import FunctionType
 from typing import Any
 
@@ -50,11 +50,13 @@ class Parameter:
     def at_bound(self, value: float) -> bool:
         """Return whether a value stands at an end of what is possible, at which the search for it stopped.
 
-        An end at which nothing acts is none, nor one that a vessel can really be at.
+        An end at which nothing acts is none, nor one that a vessel can really be at. The range of what is positive and has
+        no neutral value in it, such as a time constant from 0.1 to 300 s, is that of its logarithm.
         """
-        near = EFFECTS.at_bound * (self.high - self.low)
+        scale = log if self.low > max(self.neutral, 0.0) else float
+        near = EFFECTS.at_bound * (scale(self.high) - scale(self.low))
         ends = [end for end in (self.low, self.high) if end != self.neutral and end not in self.attainable]
-        return any(abs(value - end) <= near for end in ends)
+        return any(abs(scale(max(value, self.low)) - scale(end)) <= near for end in ends)
 
 
 @dataclass(frozen=True)

@@ -174,10 +174,18 @@ class EffectThresholds:
         "lowest frequency of waves",
         "convention: deep-water waves of a quarter of the frequency are sixteen times as long, and slower is no sea",
     )
+    least_coherence: float = threshold(
+        1.0,
+        "periods",
+        "least time constant of waves",
+        "derived: the covariance of the filter, fitted by Whittle's likelihood, has 1.17 periods for the elevation of a fully "
+        "developed sea (Pierson and Moskowitz), and 1.51 for that of JONSWAP",
+    )
     at_bound: float = threshold(
         0.01,
         "of the range of a parameter",
-        "nearer to an end of it than this, a search was stopped by the bound",
+        "nearer to an end of it than this, a search was stopped by the bound; of the range's logarithm for time constants and "
+        "frequencies",
         "convention: a hundredth",
     )
     heaviest_load: float = threshold(

@@ -8,7 +8,7 @@ Fossen (2021), section 10.2, driven by white noise.
 
 from __future__ import annotations
 
-from math import sqrt
+from math import inf, sqrt
 from typing import Any
 
 import numpy as np
@@ -61,6 +61,17 @@ def unsteady(force_model: ForceModel) -> Processes:
     return processes
 
 
+def doubt(values: Values, profile: Profile) -> str:
+    """Return that a force keeps its phase for less than a period, which a sea does not, as the end of a sentence."""
+    period, memory = 1.0 / values.get("peak_frequency", inf), values.get("time_constant", inf)
+    if memory >= EFFECTS.least_coherence * period:
+        return ""
+    return (
+        f"its time constant of {memory:.2g} s is shorter than its period of {period:.2g} s: a sea keeps its phase for longer, "
+        "and a force that does not may be any unsteady one"
+    )
+
+
 def says(values: Values, instance: str | None) -> str:
     """Return the finding as a sentence."""
     forces = [
@@ -103,6 +114,7 @@ EFFECT = Effect(
     in_part=True,
     onset=True,
     unsteady=unsteady,
+    doubt=doubt,
     # A tank may have a wave maker.
     rare_in=("tank", "pond"),
     common_in=("sea",),

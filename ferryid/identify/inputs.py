@@ -51,10 +51,13 @@ class UsableLogs:
         The logs.
     left_out
         Why each of the others is left out, as sentences.
+    paths
+        Those of the logs, in the order in which they were given.
     """
 
     opened: list[Opened]
     left_out: tuple[str, ...] = ()
+    paths: tuple[str, ...] = ()
 
     def beside(self, error: FerryIdError) -> str:
         """Return the message of what a fit of these logs was refused for, and that it was without the others."""
@@ -91,7 +94,8 @@ def usable_logs(
     errors: dict[str, FerryIdError] = {}
     found = list(usable(paths, examined, errors, lambda made: comparable(made[1].track)))
     errors |= {path: FerryIdError(f"{path}: {why}") for path, why in unengaged(responses, profile).items()}
-    return UsableLogs(_in_time([one for path, one in found if path not in errors]), left_out_of(whole, errors))
+    kept = [(path, one) for path, one in found if path not in errors]
+    return UsableLogs(_in_time([one for _, one in kept]), left_out_of(whole, errors), tuple(path for path, _ in kept))
 
 
 def _response(one: Opened, profile: Profile, settings: FitSettings) -> ForceResponse | None:

@@ -128,8 +128,8 @@ def _rest(diagnosis: Diagnosis) -> list[str]:
     """Return why a log is explained in part only, as sentences."""
     worse, much = worse_axes(ratio_of(diagnosis)), diagnosis.remainder.much
     parts = []
-    if any(one.effect == UNKNOWN for one in diagnosis.findings):
-        parts.append("More is missing, which nothing known here explains.")
+    if unknown := _without_a_name("More", diagnosis.findings):
+        parts.append(unknown)
     if worse:
         parts.append(f"In {listed(worse)} the findings make the force error larger.")
     if much:
@@ -137,6 +137,15 @@ def _rest(diagnosis: Diagnosis) -> list[str]:
     if not diagnosis.remainder.testable:
         parts.append("Whether more is missing, this log cannot show.")
     return parts
+
+
+def _without_a_name(what: str, findings: Sequence[Finding]) -> str:
+    """Return that something, or more, is missing for which there is no name, as a sentence; empty where it is not."""
+    found = [one for one in findings if one.effect == UNKNOWN]
+    if not found:
+        return ""
+    what = what if any(one.sure for one in found) else f"Perhaps {what.lower()}"
+    return f"{what} is missing, which nothing known here explains."
 
 
 def changed(shares: Mapping[str, float]) -> str:
@@ -425,8 +434,8 @@ def summary(diagnoses: Sequence[Diagnosis]) -> str:
         parts.append(f"In {unrecorded} of them a force acted that was not recorded.")
     if perhaps:
         parts.append(f"Perhaps the model {'also ' if sure else ''}left out {listed(perhaps)}.")
-    if len(named) < len(every):
-        parts.append(f"{'More' if named else 'Something'} is missing, which nothing known here explains.")
+    if unknown := _without_a_name("More" if named else "Something", every):
+        parts.append(unknown)
     return " ".join(filter(None, (*parts, copies(diagnoses))))
 
 

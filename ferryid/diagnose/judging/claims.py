@@ -120,6 +120,8 @@ class LogFigures:
         Noise of the velocity, times damping, over what moves the vessel, by axis.
     unsteady
         True where something unsteady that nobody measured was found or left over.
+    wind_measured
+        True where the wind was measured, so that what is unsteady is no gust that nobody measured.
     campaign
         Lasting properties of the vessel that each log of the campaign shows, this log's among them.
     weighed
@@ -143,6 +145,7 @@ class LogFigures:
     hull_logs: int = 1
     velocity_noise: Mapping[str, float] = field(default_factory=dict)
     unsteady: bool = False
+    wind_measured: bool = False
     campaign: tuple[frozenset[Key], ...] = ()
     weighed: frozenset[Key] = frozenset()
     baseline_sensors: Mapping[str, Mapping[str, Estimate]] = field(default_factory=dict)

@@ -15,7 +15,7 @@ from ferryid.counts import counted
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.claims import Claim, Figures, Key, LogFigures
 from ferryid.diagnose.judging.credibility import worsened
-from ferryid.diagnose.judging.experiment_design import CALM, HULL_FIRST, fitting
+from ferryid.diagnose.judging.experiment_design import HULL_FIRST, fitting, manoeuvre
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
@@ -385,9 +385,9 @@ def pose_jumps(finding: Finding, context: Context, _threshold: float) -> Outcome
 def out_of_step_beside_disturbance(finding: Finding, context: Context, threshold: float) -> Outcome:
     """Lower a delay or lag beside unmeasured disturbances, unless it removes this much on an axis or no controller answers.
 
-    A controller answers every gust some time after it has moved the vessel, so that force and motion seem to be out of step.
-    That explains little of what moves the vessel: what removes most of the error is no such thing. Nor is what gains more than
-    the forces tell of the disturbances: see `ferryid.diagnose.inference.feedback`.
+    A controller answers every gust or wave some time after it has moved the vessel, so that force and motion seem to be out of
+    step. That explains little of what moves the vessel: what removes most of the error is no such thing. Nor is what gains
+    more than the forces tell of the disturbances: see `ferryid.diagnose.inference.feedback`.
     """
     # A property of all logs removes over all of them, and is the same in each.
     removed = finding.improvement if context.own.kind == "property" else context.own.removed
@@ -398,8 +398,9 @@ def out_of_step_beside_disturbance(finding: Finding, context: Context, threshold
     if not doubtful or removes >= threshold:
         return finding, ""
     here = context.log.circumstances
-    unsteady = "waves" if here.setting in effects()["gusts"].absent_in else "gusts"
-    return lowered(finding, unsteady, manoeuvre=fitting(CALM, here)), ""
+    no_gusts = context.log.wind_measured or here.setting in effects()["gusts"].absent_in
+    unsteady = "waves" if no_gusts else "gusts"
+    return lowered(finding, unsteady, manoeuvre=manoeuvre(finding.effect, (unsteady,), here)), ""
 
 
 @rule()

@@ -93,6 +93,7 @@ def _judged(
         hull_logs=baseline.hull_logs,
         velocity_noise=velocity_noise_shares(problem),
         unsteady=unknown.unsteady or bool(states),
+        wind_measured=measurements.wind is not None,
         baseline_sensors=baseline.sensors,
         circumstances=Circumstances.of(measurements.profile),
         hull_doubt=refitted_hull(problem, stands.fit, known=baseline.hull_known).doubt,

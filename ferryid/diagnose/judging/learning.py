@@ -9,6 +9,7 @@ from math import isfinite, nan
 import numpy as np
 
 from ferryid.cached import cached_property
+from ferryid.counts import counted, verb
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
 from ferryid.effects.wording import listed, titled
@@ -22,6 +23,7 @@ from ferryid.identify import (
     fit_remainder,
     prediction_errors,
     read_logs,
+    usable_logs,
     with_remainder,
 )
 from ferryid.models import ForceScores, Model, ModelScores, StoredEffect, blank_model
@@ -153,6 +155,11 @@ class Learner:
             # Whatever was found beside forces that act the wrong way is an error of the profile.
             raise
         except FerryIdError as error:
+            if (others := self._that_can_be_fitted()) is not None:
+                stored, learned = others.learn(diagnosed, name, wider)
+                few = len(self.paths) - len(others.paths)
+                without = f"{counted(few, 'log')} that a fit cannot use {verb(few, 'is')} no part of it"
+                return stored, replace(learned, says=f"{learned.says.removesuffix('.')}; {without}.")
             # What a fit should do instead names options that a diagnosis has not.
             cause = str(error).partition(" Fix: ")[0]
             return diagnosed, Learned(False, f"Nothing was learned beside the findings: {cause.removesuffix('.')}.")
@@ -162,6 +169,17 @@ class Learner:
             return self._with_hints(wider, *found)
         except FerryIdError:
             return found
+
+    def _that_can_be_fitted(self) -> Learner | None:
+        """Return a learner from those logs that a fit can use; None where that is all of them, or none.
+
+        A diagnosis has a use for some that a fit has not, such as those of a constant thrust.
+        """
+        try:
+            logs = usable_logs(self.paths, self.profile, self.settings.on(self.profile), self.run, "correction")
+        except FerryIdError:
+            return None
+        return replace(self, paths=logs.paths) if logs.left_out else None
 
     def _with_hints(self, wider: Model, model: Model | None, learned: Learned) -> tuple[Model | None, Learned]:
         """Return a model with effects that are hints where it predicts better than the one without them, else that one."""

@@ -344,8 +344,13 @@ def test_what_a_controllers_answer_looks_like_is_a_hint_beside_gusts(effect: str
     judged, _ = out_of_step_beside_disturbance(found(effect), context(0.3))
     assert judged is not None
     assert ("gusts" in judged.unresolved_with) != sure
-    for setting, beside, how in (("tank", "waves", "the water at rest"), ("sea", "gusts", "calm day")):
-        there = replace(context(0.3), log=LogFigures(unsteady=True, circumstances=Circumstances(setting)))
+    for setting, wind, beside, how in (
+        ("tank", False, "waves", "the water at rest"),
+        ("sea", False, "gusts", "calm day"),
+        ("", True, "waves", "still water"),
+    ):
+        where = Circumstances(setting)
+        there = replace(context(0.3), log=LogFigures(unsteady=True, wind_measured=wind, circumstances=where))
         lower, _ = out_of_step_beside_disturbance(found(effect), there)
         assert lower is not None
         assert (beside in lower.unresolved_with and how in str(lower.separating_manoeuvre)) != sure

@@ -73,6 +73,21 @@ def doubt(effect: str, **values: float) -> str:
         ("payload", {"mass": 100.0, "x": 0.6 * LENGTH}, "ahead of the body origin is off a hull"),
         ("fouling", {"surge": 1.5, "sway": 5.99}, "its sway of 5.99 - stands at the bound of its search"),
         ("hull_parameters", {"m11": 0.06}, "its m11 of 0.06 - stands at the bound of its search"),
+        # Of a time constant from 0.1 to 300 s, one of seconds lies in the middle: the search is over orders of magnitude.
+        ("gusts", {"std": 1.0, "time_constant": 2.8}, ""),
+        ("waves", {"peak_frequency": 0.45, "time_constant": 2.3}, ""),
+        (
+            "waves",
+            {"peak_frequency": 0.45, "time_constant": 2.1},
+            "of 2.1 s is shorter than its period of 2.2 s: a sea keeps",
+        ),
+        ("waves", {"peak_frequency": 2.99, "time_constant": 2.3}, "its peak frequency of 2.99 Hz stands at the bound"),
+        (
+            "gusts",
+            {"std": 1.0, "time_constant": 0.105},
+            "its time constant of 0.105 s stands at the bound of its search",
+        ),
+        ("gusts", {"std": 1.0, "time_constant": 290.0}, "its time constant of 290 s stands at the bound of its search"),
         ("thruster_gain", {"factor": 2.99}, "its factor of 2.99 - stands at the bound"),
         # A thruster may give nothing at all, and a line may hold along one direction alone.
         ("thruster_gain", {"factor": 0.0}, ""),

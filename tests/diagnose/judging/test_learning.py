@@ -304,6 +304,17 @@ def test_a_log_that_cannot_be_fitted_leaves_the_model_as_it_is(folder: Path) -> 
     assert learned.says.startswith("Nothing was learned beside the findings: ")
 
 
+def test_a_log_that_cannot_be_fitted_leaves_the_others_to_learn_from(windy: tuple[str, Model], folder: Path) -> None:
+    short = sailed(folder, "seconds", f"duration_s = 1\n{TWELVE}", 5)
+    stored, learned = Learner((windy[0], short), FERRY, None, RunContext(folder), QUICK).learn(None, "ferry")
+    alone, plain = Learner((windy[0],), FERRY, None, RunContext(folder), QUICK).learn(None, "ferry")
+    assert stored is not None
+    assert alone is not None
+    np.testing.assert_array_equal(stored.theta, alone.theta)
+    assert learned.ratio == plain.ratio
+    assert learned.says == f"{plain.says.removesuffix('.')}; 1 log that a fit cannot use is no part of it."
+
+
 def test_forces_that_are_reversed_beside_the_findings_alone_end_nothing(
     windy: tuple[str, Model], folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

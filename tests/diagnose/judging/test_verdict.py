@@ -211,6 +211,15 @@ def test_hints_of_several_logs_are_told_as_hints() -> None:
     )
 
 
+@pytest.mark.parametrize(("beside", "what"), [((), "something"), ((replace(HINT, effect="waves"),), "more")])
+def test_something_without_a_name_that_is_a_hint_is_perhaps_missing(beside: tuple[Finding, ...], what: str) -> None:
+    doubtful = replace(NAMELESS, probability=HINT.probability)
+    logs = [Diagnosis(name, "ferry", "not_testable", (doubtful, *beside), {}, {}) for name in "ab"]
+    assert summary(logs).endswith(f" Perhaps {what} is missing, which nothing known here explains.")
+    partly = Diagnosis("log", "ferry", "partly_explained", (SURE, doubtful), {}, {})
+    assert headline(partly).endswith(" Perhaps more is missing, which nothing known here explains.")
+
+
 def test_where_no_log_has_a_name_something_is_missing_and_not_more() -> None:
     logs = [Diagnosis(name, "ferry", verdict_of((NAMELESS,), Remainder()), (NAMELESS,), {}, {}) for name in "ab"]
     assert summary(logs) == "Of 2 logs, 2 unexplained. Something is missing, which nothing known here explains."
