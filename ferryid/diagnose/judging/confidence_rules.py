@@ -299,14 +299,14 @@ def _one_log_at_most(log: LogFigures) -> bool:
 def hull_from_this_log(finding: Finding, context: Context, _threshold: float) -> Outcome:
     """Lower forces where the hull is known from nothing but the log that shows them.
 
-    A hull that a campaign's other logs speak for is known as far as forces go, but not by one other log: the two may be off
-    from each other in their manoeuvres, and nothing shows in which. What a disturbance shakes is still guessed at, and may be
-    its measurement. What sets in within the log is known by that: no hull changes from one moment to the next. What
-    acts all along is, where it stands out against every force that the motion decides.
+    A hull that a campaign's other logs speak for is known as far as forces go, and so is what a disturbance shakes, but not by
+    one other log: the two may be off from each other in their manoeuvres, and nothing shows in which. What sets in within the
+    log is known by that: no hull changes from one moment to the next. What acts all along is, where it stands out against
+    every force that the motion decides.
     """
     if context.own.sets_in or context.own.beyond_hull:
         return finding, ""
-    guessed = {"force": _one_log_at_most(context.log), "disturbance": True}.get(context.own.kind, False)
+    guessed = context.own.kind in ("force", "disturbance") and _one_log_at_most(context.log)
     if context.log.hull_known or not guessed:
         return finding, ""
     return lowered(finding, "hull_parameters", manoeuvre=fitting(HULL_FIRST, context.log.circumstances)), ""

@@ -280,7 +280,7 @@ def test_bursts_hints_and_what_is_fast_stand_in_for_nothing() -> None:
         ("force", False, False, False),
         ("force", False, True, True),
         ("disturbance", False, False, False),
-        ("disturbance", False, True, False),
+        ("disturbance", False, True, True),
         ("disturbance", True, True, True),
         ("sensor", False, False, True),
     ],
