@@ -45,7 +45,7 @@ def log_warnings(told: Sequence[tuple[str, Sequence[str]]]) -> tuple[str, ...]:
 def _ranged(shape: str, sentences: Sequence[str]) -> str:
     """Return sentences of one shape as one, with the least and the most of each number that differs.
 
-    Intervals, ``"1 to 2"``, become the one that holds them all.
+    Intervals, in brackets or called that, become the one that holds them all.
     """
     columns = list(zip(*(NUMBER.findall(one) for one in sentences), strict=True))
     text, known = "", 0
@@ -53,7 +53,8 @@ def _ranged(shape: str, sentences: Sequence[str]) -> str:
         if part == PLACE:
             text += _range(columns[known])
         elif part == f"{PLACE} to {PLACE}":
-            text += _hull(columns[known], columns[known + 1])
+            both = columns[known], columns[known + 1]
+            text += _enclosing(*both) if text.endswith(("interval ", "(")) else _from_to(*both)
         else:
             text += part
         known += part.count(PLACE)
@@ -70,8 +71,12 @@ def _range(numbers: Sequence[str]) -> str:
     return least if least == most else f"{least} to {most}"
 
 
-def _hull(starts: Sequence[str], ends: Sequence[str]) -> str:
-    """Return intervals, or changes from one number to another, as the one that holds them all."""
-    if all(_value(start) <= _value(end) for start, end in zip(starts, ends, strict=True)):
-        return f"{min(starts, key=_value)} to {max(ends, key=_value)}"
-    return f"({_range(starts)}) to ({_range(ends)})"
+def _enclosing(lows: Sequence[str], highs: Sequence[str]) -> str:
+    """Return the interval that holds some, by their ends."""
+    return f"{min(lows, key=_value)} to {max(highs, key=_value)}"
+
+
+def _from_to(starts: Sequence[str], ends: Sequence[str]) -> str:
+    """Return what goes from one number to another, each with its range."""
+    every = [_range(starts), _range(ends)]
+    return " to ".join(f"({one})" if " to " in one else one for one in every)

@@ -36,5 +36,9 @@ def test_intervals_of_several_logs_become_the_one_that_holds_them_all() -> None:
         for one, low, high in (("3.48", "2.00", "5.01"), ("2.85", "1.65", "4.00"), ("3.00", "2.49", "7.11"))
     ]
     assert told(*slopes) == "3 logs: The slope is 2.85 to 3.48 times it, 99 % interval 1.65 to 7.11, of 7 to 8."
-    # A fall is no interval.
-    assert told("It fell, 9 to 4.", "It fell, 8 to 3.", "It fell, 7 to 6.") == "3 logs: It fell, (7 to 9) to (3 to 6)."
+    assert told("A (1 to 2).", "A (0 to 5).", "A (1 to 3).") == "3 logs: A (0 to 5)."
+    # A change is no interval.
+    assert told("It went from 9 to 4.", "It went from 8 to 5.", "It went from 1 to 6.") == (
+        "3 logs: It went from (1 to 9) to (4 to 6)."
+    )
+    assert told("Bytes 5 to 9.", "Bytes 5 to 8.", "Bytes 5 to 7.") == "3 logs: Bytes 5 to (7 to 9)."

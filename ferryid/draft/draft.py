@@ -176,9 +176,7 @@ def _no_way(signals: Sequence[MappedSignal], topics: Sequence[Topic]) -> tuple[s
     if {"position", "velocity"} & {one.quantity for one in signals}:
         return ()
     mapped = {(one.topic, field) for one in signals for field in one.fields}
-    speeds = [
-        (topic.name, path) for topic in topics for path in speeds_ahead(topic) if (topic.name, path) not in mapped
-    ]
+    speeds = [one for one in speeds_ahead(topics) if one not in mapped]
     told = "no position and no velocity is mapped, of which a fit needs one"
     if not speeds:
         return (f"{told}, and no field has a name of either",)

@@ -87,6 +87,9 @@ RATES = frozenset(
 )
 HEADING = frozenset({"heading", "hdg", "yaw", "psi", "compass", "hdt"})
 _AHEAD = SPEEDS | {"u", "surge", "spd", "sog", "stw"}
+_OF_A_SPEED = frozenset({"water", "field"})
+"""Words of what is no pose or velocity that the name of a speed has all the same: through the water, the field of a message."""
+_ASIDE = frozenset({"y", "z"})
 _OTHER_SPEEDS = frozenset({"wind", "air", "vertical", "down", "heave", "sway", "turn"})
 _QUATERNION = frozenset({"orientation", "rotation", "quaternion", "heading", "attitude"})
 ACTUATORS = frozenset(
@@ -188,12 +191,16 @@ def numeric_fields(topic: Topic) -> dict[str, tuple[str, ...]]:
     return found
 
 
-def speeds_ahead(topic: Topic) -> list[str]:
-    """Return the fields of a topic that may be the speed ahead by their names, those with the fewest other words first."""
-    others = ORDERS | RATES | HEADING | ACTUATORS | _NO_MEASUREMENT | _OTHER_SPEEDS
-    fields = {path: set(words) for path, words in numeric_fields(topic).items()}
-    found = [path for path, words in fields.items() if words & _AHEAD and not words & others]
-    return sorted(found, key=lambda path: len(fields[path] - _AHEAD))
+def speeds_ahead(topics: Sequence[Topic]) -> list[tuple[str, str]]:
+    """Return topic and field of what may be the speed ahead by its name, those with the fewest other words first."""
+    others = ORDERS | RATES | HEADING | ACTUATORS | (_NO_MEASUREMENT - _OF_A_SPEED) | _OTHER_SPEEDS
+    found = [
+        (len(set(words) - _AHEAD), topic.name, path)
+        for topic in topics
+        for path, words in numeric_fields(topic).items()
+        if _AHEAD & set(words) and not others & set(words) and words[-1] not in _ASIDE
+    ]
+    return [(topic, path) for _, topic, path in sorted(found, key=lambda one: one[0])]
 
 
 def span_of(topic: Topic) -> float:

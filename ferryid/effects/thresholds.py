@@ -178,14 +178,14 @@ class EffectThresholds:
         1.0,
         "periods",
         "least time constant of waves",
-        "derived: the covariance of the filter, fitted by Whittle's likelihood, has 1.17 periods for the elevation of a fully "
-        "developed sea (Pierson and Moskowitz), and 1.51 for that of JONSWAP",
+        "convention: the covariance of the filter, fitted by Whittle's likelihood up to four times the peak frequency, has "
+        "1.17 periods for the elevation of a fully developed sea (Pierson and Moskowitz), and 1.51 for that of JONSWAP",
     )
     at_bound: float = threshold(
         0.01,
         "of the range of a parameter",
-        "nearer to an end of it than this, a search was stopped by the bound; of the range's logarithm for time constants and "
-        "frequencies",
+        "nearer to an end of it than this, a search was stopped by the bound; of its logarithm where a parameter is "
+        "positive and has no neutral value",
         "convention: a hundredth",
     )
     heaviest_load: float = threshold(

@@ -62,13 +62,13 @@ def unsteady(force_model: ForceModel) -> Processes:
 
 
 def doubt(values: Values, profile: Profile) -> str:
-    """Return that a force keeps its phase for less than a period, which a sea does not, as the end of a sentence."""
+    """Return that a force is coherent for less than a period, as no sea is, as the end of a sentence."""
     period, memory = 1.0 / values.get("peak_frequency", inf), values.get("time_constant", inf)
     if memory >= EFFECTS.least_coherence * period:
         return ""
     return (
-        f"its time constant of {memory:.2g} s is shorter than its period of {period:.2g} s: a sea keeps its phase for longer, "
-        "and a force that does not may be any unsteady one"
+        f"its time constant is {memory / period:.2f} of its period: a sea is coherent for longer than one, so that this may be "
+        "any unsteady force"
     )
 
 

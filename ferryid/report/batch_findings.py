@@ -8,7 +8,7 @@ from pathlib import PurePath
 
 from ferryid.counts import counted
 from ferryid.diagnose import JUDGING, UNKNOWN, Estimate
-from ferryid.effects.wording import listed, uncapitalised
+from ferryid.effects.wording import uncapitalised
 from ferryid.report.batch_rows import FindingSummary, SummaryRow
 from ferryid.report.diagnosis_words import sized, title
 
@@ -39,13 +39,20 @@ def losses_in(rows: Sequence[SummaryRow]) -> str:
 
 def copies_in(rows: Sequence[SummaryRow]) -> str:
     """Return which logs hold the same recording byte by byte, each of which counts for itself. Empty without."""
-    names: dict[str, list[str]] = {}
+    logs: dict[str, dict[str, None]] = {}
     for row in rows:
         if row.sha256:
-            names.setdefault(row.sha256, []).append(PurePath(row.log).name)
-    same = [f"{one[0]} ({listed(one[1:])})" for one in names.values() if len(one) > 1]
+            logs.setdefault(row.sha256, {})[row.log] = None
+    same = [" = ".join(_distinct(list(one))) for one in logs.values() if len(one) > 1]
     more = f" and {len(same) - NAMED} more" if len(same) > NAMED else ""
-    return f"the same recording under further names, each counted: {', '.join(same[:NAMED])}{more}" if same else ""
+    return f"Identical logs, each of which counts: {', '.join(same[:NAMED])}{more}" if same else ""
+
+
+def _distinct(logs: Sequence[str]) -> list[str]:
+    """Return the names of some logs, the first `NAMED` of them, with their folders where they have one name."""
+    names = [PurePath(one).name for one in logs]
+    told = names if len(set(names)) == len(names) else [str(PurePath(*PurePath(one).parts[-2:])) for one in logs]
+    return told[:NAMED] + [f"{len(told) - NAMED} more"] * (len(told) > NAMED)
 
 
 def is_damaged(row: SummaryRow) -> bool:

@@ -62,12 +62,18 @@ def mirrored(eta: Floats, nu: Floats, usable: NDArray[np.bool_], rate_hz: float)
     fits = {name: _fit(way, _summed(values, starts, span), free) for name, values in every.items()}
     best = max(fits, key=lambda name: fits[name])
     declared = fits[""]
-    # What is declared may be exact, as in a track that was made from the velocities.
-    if best == "" or fits[best] < SIGNALS.mirror_correlation:
-        return "", ""
-    if SIGNALS.mirror_ratio * (1.0 - fits[best] ** 2) > 1.0 - declared**2:
+    if fits[best] < SIGNALS.mirror_correlation or not _far_better(fits[best], declared):
         return "", ""
     return best, f"{SAYS[best]} (correlation {fits[best]:.2f} so, {declared:.2f} as declared)."
+
+
+def _far_better(other: float, declared: float) -> bool:
+    """Return whether another hand leaves far less of the variance than the declared one, by correlations of either.
+
+    Both are exact on a straight track that was made from the velocities: then rounding would decide.
+    """
+    left, of_other = (max(1.0 - one**2, SIGNALS.mirror_rounding) for one in (declared, other))
+    return SIGNALS.mirror_ratio * of_other <= left
 
 
 @dataclass(frozen=True)
@@ -96,8 +102,7 @@ class CourseAgainstHeading:
     @property
     def says(self) -> str:
         """A sentence where the heading turns the wrong way round; empty where it does not certainly."""
-        left, other = 1.0 - self.declared**2, 1.0 - self.mirrored**2
-        if self.mirrored < SIGNALS.course_mirrored or SIGNALS.mirror_ratio * other > left:
+        if self.mirrored < SIGNALS.course_mirrored or not _far_better(self.mirrored, self.declared):
             return ""
         return (
             f"The heading turns the wrong way round against the course (mean resultant length {self.mirrored:.2f} so, "

@@ -359,7 +359,7 @@ def _within(measured: Measured, half: int) -> Flags:
         if whole >= needed:
             raise FerryIdError(
                 f"{measured.log}: no stretch in which all signals are measured is as long as the smoothing window, found "
-                f"{longest:.2f} s unbroken of {whole:.0f} s where {needed:.2f} s are needed. Fix: see with ferryid inspect "
+                f"{longest:.2f} s unbroken of {whole:.2f} s where {needed:.2f} s are needed. Fix: see with ferryid inspect "
                 "which signals are missing, and map others, or use a shorter --window"
             )
         raise FerryIdError(

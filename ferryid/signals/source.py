@@ -87,10 +87,13 @@ class Source:
 def sources_of(stream: Stream) -> tuple[Source, ...]:
     """Clean a stream: one source, and more where columns have values at rates of their own; see `at_own_rates`."""
     sources = []
-    for part in at_own_rates(stream):
-        merged = part.time_ns.size < stream.time_ns.size
-        source = source_of(part, merged=merged)
-        if merged:
+    for part, rows in _parts(stream):
+        # Rows of a table without an order are no gap of it where each order that is written is another one.
+        written = all(is_order(name) for name in part.columns) and 1 < rows.sum() < rows.size and _as_it_changes(rows)
+        source = source_of(part, written=written and _says_new(part.columns))
+        if written and source.on_change:
+            source = replace(source, remarks=(_held_for(part, stream), *source.remarks))
+        elif not rows.all():
             said = (
                 f"{stream.topic}: {', '.join(part.columns)} {'has' if len(part.columns) == 1 else 'have'} a value in "
                 f"{part.time_ns.size} of {counted(stream.time_ns.size, 'row')}, "
@@ -105,30 +108,40 @@ def at_own_rates(stream: Stream) -> tuple[Stream, ...]:
     """Return a stream in parts, each of the columns that have their values in the same rows, at the times of these.
 
     A table that several sensors were merged into has rows in which others than the one that was read have no value. A column
-    of which hardly any two values lie on neighbouring rows is one of these; so is an order that some rows lack, as it may be
-    written when it changes. Other columns stay together, whatever they lack: a sensor that fails has gaps.
+    of which hardly any two values lie on neighbouring rows, or whose values lie apart at regular times, is one of these; so is
+    an order that is written when it changes. Other columns stay together, whatever they lack: a sensor that fails has gaps.
     """
+    return tuple(part for part, _ in _parts(stream))
+
+
+def _parts(stream: Stream) -> list[tuple[Stream, Flags]]:
+    """Return the parts of `at_own_rates`, each with the rows that it has, shape (n,)."""
     time_s = np.asarray((stream.time_ns - stream.time_ns[:1]) * 1e-9, dtype=np.float64)
+    every = np.ones(time_s.size, dtype=bool)
     columns: dict[bytes, list[str]] = {}
     rows: dict[bytes, Flags] = {}
     for name, values in stream.columns.items():
         finite: Flags = np.isfinite(values)
         for other in next((pair for pair in _TOGETHER if name in pair), ()):
             finite = finite | np.isfinite(stream.columns.get(other, values))
-        key = finite.tobytes() if not is_load(name) and _at_own_rate(name, finite, time_s) else b""
-        columns.setdefault(key, []).append(name)
-        rows.setdefault(key, finite)
-    if list(columns) in ([], [b""]):
-        return (stream,)
-    return tuple(
-        replace(
-            stream,
-            time_ns=stream.time_ns[rows[key]] if key else stream.time_ns,
-            columns={name: stream.columns[name][rows[key]] if key else stream.columns[name] for name in names},
-            receive_ns=stream.receive_ns[rows[key]] if key else stream.receive_ns,
+        if is_load(name) or not _at_own_rate(name, finite, time_s):
+            finite = every
+        columns.setdefault(finite.tobytes(), []).append(name)
+        rows.setdefault(finite.tobytes(), finite)
+    if len(columns) < 2 and all(one.all() for one in rows.values()):
+        return [(stream, every)]
+    return [
+        (
+            replace(
+                stream,
+                time_ns=stream.time_ns[rows[key]],
+                columns={name: stream.columns[name][rows[key]] for name in names},
+                receive_ns=stream.receive_ns[rows[key]],
+            ),
+            rows[key],
         )
         for key, names in columns.items()
-    )
+    ]
 
 
 def _at_own_rate(name: str, finite: Flags, time_s: Floats) -> bool:
@@ -136,18 +149,57 @@ def _at_own_rate(name: str, finite: Flags, time_s: Floats) -> bool:
     rows = np.flatnonzero(finite)
     if not 1 < rows.size < finite.size:
         return False
+    apart = np.diff(rows)
+    usually_apart = bool(np.median(apart) >= SIGNALS.rows_apart)
     if is_order(name):
-        return True
-    # Of a sensor that fails, values are left on neighbouring rows too.
-    own = float(np.quantile(np.diff(rows), SIGNALS.neighbouring_share)) >= SIGNALS.rows_apart
-    slowest_s = SIGNALS.slowest_weather_s if name.startswith(_WEATHER) else SIGNALS.slowest_sensor_s
-    return own and float(np.median(np.diff(time_s[rows]))) <= slowest_s
+        return usually_apart or _as_it_changes(finite)
+    weather = name.startswith(_WEATHER)
+    slowest_s = SIGNALS.slowest_weather_s if weather else SIGNALS.slowest_sensor_s
+    often = float(np.median(np.diff(time_s[rows]))) <= slowest_s
+    # Two values are what is left of an anemometer that fails.
+    if not often or (weather and rows.size < SIGNALS.fewest_weather_values):
+        return False
+    # Of a sensor that fails, values are left on neighbouring rows too, or at irregular times.
+    few_neighbours = bool(np.quantile(apart, SIGNALS.neighbouring_share) >= SIGNALS.rows_apart)
+    return few_neighbours or (usually_apart and _regular(np.diff(time_s[rows])))
 
 
-def source_of(stream: Stream, *, merged: bool = False) -> Source:
+def _regular(apart: Floats) -> bool:
+    """Return whether most distances between values, shape (n,), are about the usual one."""
+    low, high = SIGNALS.regular_range
+    usual = float(np.median(apart))
+    return float(np.mean((apart > low * usual) & (apart < high * usual))) >= SIGNALS.regular_share
+
+
+def _as_it_changes(finite: Flags) -> bool:
+    """Return whether an order in some rows of a table, shape (n,), is missing from the others as it is the same there.
+
+    Either its values lie apart at irregular times, or it often rests, and no rest is most of all, as where a recorder fails.
+    """
+    rows = np.flatnonzero(finite)
+    apart = np.diff(rows)
+    usual = float(np.median(apart))
+    # It is held to the end of the table.
+    rests = np.append(apart, finite.size - rows[-1])
+    rests = rests[rests > SIGNALS.gap_periods * usual]
+    often = rests.size >= SIGNALS.fewest_rests and 2 * int(rests.max()) <= int(rests.sum())
+    return often or (usual >= SIGNALS.rows_apart and not _regular(apart.astype(np.float64)))
+
+
+def _held_for(part: Stream, table: Stream) -> str:
+    """Return for how long the orders of a part are held, to the end of their table, as a sentence."""
+    longest_s = float(np.diff(np.append(part.time_ns, table.time_ns[-1:])).max()) * 1e-9
+    return (
+        f"{table.topic}: {', '.join(part.columns)} {verb(len(part.columns), 'has')} a value in {part.time_ns.size} of "
+        f"{counted(table.time_ns.size, 'row')}: taken as written when it changes; each value holds until the next, at most "
+        f"for {longest_s:.1f} s."
+    )
+
+
+def source_of(stream: Stream, *, written: bool = False) -> Source:
     """Take implausible, stale and stuck samples out of a stream, and find what counts as a gap in it.
 
-    `merged` is True of columns that other rows of their table lack.
+    `written` is True of orders that are known to be written when they change.
     """
     time_ns = np.asarray(stream.time_ns)
     time_s = (time_ns - time_ns[0]) * 1e-9
@@ -181,19 +233,17 @@ def source_of(stream: Stream, *, merged: bool = False) -> Source:
                 f"{verb(int(same.sum()), 'repeats')} an old one to the last digit for more "
                 f"than {frozen:.2f} s; taken as missing."
             )
-    # Rows of a table without an order are no gap of it where each order that is written is another one.
-    written = merged and all(is_order(name) for name in stream.columns) and _says_new(stream.columns)
     unchanged = written or _on_change(time_s, stream.columns)
     interval = np.diff(time_s)
     gaps = interval > bridge
     if interval.size and all(is_load(name) for name in columns):
         remarks.append(f"{stream.topic}: each value holds until the next, at most for {interval.max():.1f} s.")
-    elif interval.size and unchanged:
+    elif interval.size and unchanged and not written:
         remarks.append(
             f"{stream.topic}: published when it changes; each value holds until the next, "
             f"at most for {interval.max():.1f} s."
         )
-    elif gaps.any():
+    elif gaps.any() and not unchanged:
         remarks.append(
             f"{stream.topic}: {counted(int(gaps.sum()), 'gap')} longer than {bridge:.2f} s, {interval[gaps].sum():.1f} s in "
             "all; not bridged."

@@ -26,6 +26,18 @@ class SignalThresholds:
         "distance of the values of a column of a table from which the rows between are other sensors'",
         "derived: another sensor of the same rate has the rows between",
     )
+    regular_range: tuple[float, ...] = threshold(
+        (0.6, 1.6),
+        "of the usual",
+        "distances between the values of such a column that count as regular",
+        "derived: a sensor of 4 Hz has values two and three rows of 10 Hz apart",
+    )
+    regular_share: float = threshold(
+        0.6,
+        "of the distances",
+        "that are regular at least where a column has a rate of its own",
+        "derived: where values are lost at random, less than half are",
+    )
     neighbouring_share: float = threshold(
         0.1,
         "of the values",
@@ -39,7 +51,16 @@ class SignalThresholds:
         "convention: slow receivers and logs report the motion every ten seconds",
     )
     slowest_weather_s: float = threshold(
-        60.0, "s", "the same of wind and current", "convention: stations report the wind every minute"
+        900.0, "s", "the same of wind and current", "convention: stations report means over ten minutes, with room"
+    )
+    fewest_weather_values: int = threshold(
+        3, "values", "fewest of wind or current that are a rate of their own", "derived: two have one distance"
+    )
+    fewest_rests: int = threshold(
+        10,
+        "rests",
+        "fewest intervals longer than `gap_periods` of the usual, where an order in most rows is written when it changes",
+        "convention: a recorder fails less often",
     )
     stuck_periods: float = threshold(
         10.0,
@@ -466,6 +487,9 @@ class SignalThresholds:
         "-",
         "unexplained variance as declared over that when mirrored",
         "convention: no doubt which of two is right",
+    )
+    mirror_rounding: float = threshold(
+        1e-9, "of the variance", "least that a hand is said to leave", "derived: rounding of sums over a long log"
     )
     course_mirrored: float = threshold(
         0.9,

@@ -418,6 +418,8 @@ def test_a_heading_that_the_motion_does_not_show_is_to_be_checked(tmp_path: Path
     [
         ("u", 'fields = ["u"]'),
         ("speed", 'fields = ["speed"]'),
+        ("speed_through_water", 'fields = ["speed_through_water"]'),
+        ("linear.y", "no field"),
         ("depth", "no field"),
         ("motor_speed", "no field"),
         ("wind_speed", "no field"),

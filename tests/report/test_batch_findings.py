@@ -34,5 +34,10 @@ def test_logs_that_are_not_whole_are_named_though_they_are_done() -> None:
 
 def test_a_recording_under_two_names_is_told() -> None:
     rows = [row("trials/a.mcap"), row("b.mcap", 2), row("copy/twin.mcap"), row("third.mcap")]
-    assert copies_in(rows) == "the same recording under further names, each counted: a.mcap (twin.mcap and third.mcap)"
+    assert copies_in(rows) == "Identical logs, each of which counts: a.mcap = twin.mcap = third.mcap"
     assert copies_in(rows[:2]) == ""
+    # One log under two vessels is no copy; logs of one name have their folders.
+    twice = [row("trials/a.mcap"), row("trials/a.mcap"), row("copy/a.mcap")]
+    assert copies_in(twice[:2]) == ""
+    assert copies_in(twice) == "Identical logs, each of which counts: trials/a.mcap = copy/a.mcap"
+    assert copies_in([row(f"{k}.mcap") for k in range(300)]).endswith(" = 3.mcap = 4.mcap = 295 more")

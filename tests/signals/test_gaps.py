@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ferryid.signals.align import align
-from ferryid.signals.mirror import mirrored
+from ferryid.signals.mirror import course_against_heading, mirrored
 from ferryid.signals.prepare import open_track, smoothed
 from ferryid.signals.recording import record
 from ferryid.signals.smooth import measure, smooth_measured
@@ -222,14 +222,25 @@ def test_what_could_not_be_read_is_said_with_the_sum_first() -> None:
     assert any("may be lost" in said or "could not be read" in said for said in prepared.left_out)
 
 
-def test_a_track_that_was_made_from_the_velocities_is_not_mirrored() -> None:
-    """A correlation of one and a bit, by rounding, ended in a KeyError."""
+@pytest.mark.parametrize("straight", [False, True])
+def test_a_track_that_was_made_from_the_velocities_is_not_mirrored(straight: bool) -> None:
+    """A correlation above one by rounding ended in a KeyError; on one heading without sway every hand is exact."""
     for seed in range(20):
         random, rate = np.random.default_rng(seed), 10.0
         n = 6000
         nu = np.column_stack([1.0 + 0.1 * random.standard_normal(n), 0.1 * random.standard_normal(n)])
         psi = np.cumsum(0.01 * random.standard_normal(n))
+        if straight:
+            nu[:, 1], psi = 0.0, np.full(n, 0.7)
         way = (nu[:, 0] + 1j * nu[:, 1]) * np.exp(1j * psi) / rate
         place = np.concatenate([[0.0], np.cumsum(way)[:-1]])
         eta = np.column_stack([place.real, place.imag, psi])
         assert mirrored(eta, nu, np.ones(n, dtype=bool), rate) == ("", "")
+
+
+def test_a_straight_track_to_the_north_turns_no_heading_round() -> None:
+    n = 6000
+    eta = np.column_stack([0.1 * np.arange(n), np.zeros(n), np.zeros(n)])
+    found = course_against_heading(eta, np.ones(n, dtype=bool), 10.0)
+    assert found is not None
+    assert found.says == ""

@@ -151,6 +151,23 @@ def test_fixes_that_are_missed_at_random_leave_the_others(missed: float) -> None
     assert ["x", "y"] in [sorted(one.columns) for one in found.sources]
 
 
+def test_sensors_of_which_some_share_neighbouring_rows_are_taken_apart() -> None:
+    """A sixth of the fixes of 1 Hz stand in the next row too; rows of 10 and of 8 Hz that were merged by time."""
+    again = np.random.default_rng(3).random(ROWS_S.size) < 0.15
+    has = np.arange(ROWS_S.size) % 10 == 0
+    has |= np.roll(has, 1) & again
+    position = {name: np.where(has, values, np.nan) for name, values in place(ROWS_S).items()}
+    table = stream("table", ROWS_S, {**position, "psi": heading(ROWS_S), **thrusters(ROWS_S)})
+    assert ["x", "y"] in [sorted(one.columns) for one in find_faults(recording(table)).sources]
+    fast_s, slow_s = np.arange(0.0, 60.0, 0.1), np.arange(0.003, 60.0, 0.125)
+    rows_s = np.sort(np.concatenate([fast_s, slow_s]))
+    of_slow = np.isin(rows_s, slow_s)
+    columns = {name: np.where(of_slow, np.nan, values) for name, values in place(rows_s).items()}
+    columns |= {name: np.where(of_slow, values, np.nan) for name, values in thrusters(rows_s).items()}
+    found = find_faults(recording(stream("table", rows_s, columns))).sources
+    assert [sorted(one.columns) for one in found] == [["x", "y"], sorted(thrusters(rows_s))]
+
+
 def test_a_wind_of_two_values_in_minutes_is_missing() -> None:
     t = ROWS_S
     wind = {"wind_speed": 3.0 + 0.01 * t, "wind_from": 0.1 + 0.001 * t}
@@ -159,6 +176,11 @@ def test_a_wind_of_two_values_in_minutes_is_missing() -> None:
     every = {**motion(t), "psi": heading(t)}
     # A station notes the wind each half minute.
     assert len(find_faults(recording(stream("table", t, {**every, **slow}))).sources) == 2
+    late = t[-1] + np.random.default_rng(0).uniform(0.0, 0.02, t.size) + 10.0 * t
+    means = {name: np.where(np.arange(t.size) % 600 == 0, one, np.nan) for name, one in wind.items()}
+    # Two means over ten minutes are no rate, three are.
+    for values, parts in (({**motion(t), **means}, 1), ({**motion(t), **slow}, 2)):
+        assert len(find_faults(recording(stream("table", late, values))).sources) == parts
     faults = find_faults(recording(stream("table", t, {**every, **rare})))
     assert len(faults.sources) == 1
     assert any("wind_speed: 1198 of 1200 samples are missing" in said for said in faults.taken_out)
@@ -175,6 +197,40 @@ def test_an_order_holds_however_often_it_changes(coarse: bool) -> None:
     angles = {name: values for name, values in thrusters(t).items() if name.startswith("alpha")}
     track = align(recording(stream("table", t, {**place(t), "psi": heading(t), **orders, **angles})), PROFILE)
     assert track.valid[5:-5].all()
+
+
+@pytest.mark.parametrize("every", [1, 3])
+@pytest.mark.parametrize(
+    ("first", "last"), [(400, 700), (800, 1201), (500, 501)], ids=["within", "to the end", "one row"]
+)
+def test_an_order_that_is_no_longer_recorded_is_not_held(every: int, first: int, last: int) -> None:
+    """An order that ended at half of a ship's log was held for 20 minutes, and the fit to it accepted."""
+    t, row = ROWS_S, np.arange(ROWS_S.size)
+    gone = ((row >= first) & (row < last)) | (row % every > 0)
+    order = 200.0 * np.sin(0.3 * t) + np.random.default_rng(0).normal(size=t.size)
+    orders = {name: np.where(gone, np.nan, order) for name in ("n_cmd_thruster1", "n_cmd_thruster2")}
+    angles = {name: values for name, values in thrusters(t).items() if name.startswith("alpha")}
+    log = recording(stream("table", t, {**place(t), "psi": heading(t), **orders, **angles}))
+    assert not any(one.on_change for one in find_faults(log).sources)
+    track = align(log, PROFILE)
+    assert track.valid[10 : first - 10].all()
+    if last - first == 1:
+        assert track.valid[10:-10].all()
+    else:
+        assert not track.valid[first + 10 : min(last, t.size) - 10].any()
+
+
+def test_an_order_that_is_written_when_it_changes_says_for_how_long_it_holds() -> None:
+    t = ROWS_S
+    told = np.isin(np.arange(t.size), [0, 31, 32, 190, 400, 405, 700])
+    orders = {name: np.where(told, np.cumsum(told) * 50.0, np.nan) for name in ("n_cmd_thruster1", "n_cmd_thruster2")}
+    (said,) = (
+        one for one in find_faults(recording(stream("table", t, {**place(t), **orders}))).remarks if "holds" in one
+    )
+    assert said == (
+        "table: n_cmd_thruster1, n_cmd_thruster2 have a value in 7 of 1200 rows: taken as written when it changes; each value "
+        "holds until the next, at most for 49.9 s."
+    )
 
 
 def test_an_order_that_was_written_before_a_range_holds_in_it() -> None:

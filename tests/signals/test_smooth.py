@@ -318,7 +318,7 @@ def test_too_short_a_log_and_unknown_smoothers_are_refused() -> None:
         smoothed(trial(18), 1.0)
     gappy = trial(400)
     with pytest.raises(
-        FerryIdError, match=r"as long as the smoothing window, found 0\.\d+ s unbroken of 20 s .* inspect"
+        FerryIdError, match=r"as long as the smoothing window, found 0\.\d+ s unbroken of 20\.00 s .* inspect"
     ):
         smoothed(replace(gappy, valid=np.arange(400) % 10 > 0), 1.0)
     with pytest.raises(FerryIdError, match=r'no smoother called "sqare". Did you mean "square"\?'):

@@ -172,14 +172,19 @@ def value_doubt(effect: Effect, parameters: Sequence[Parameter], values: Mapping
     return ""
 
 
-def scaled_as_masses(scaled: Set[str | None], profile: Profile) -> str:
+def scaled_as_masses(scaled: Set[str | None], profile: Profile, *, shared: bool = False) -> str:
     """Return that a factor on the masses and the damping does the same as those on actuators, as the end of a sentence.
 
-    Empty where some actuator has none. `scaled` are the actuators with one, beside a hull that nobody modelled.
+    Empty where some actuator has none. `scaled` are the actuators with one, beside a hull that nobody modelled; with `shared`
+    that hull is that of other logs too, so that it may be off in one.
     """
-    if not scaled >= {one.name for one in profile.actuators}:
+    every = {one.name for one in profile.actuators}
+    if not every or not scaled >= every:
         return ""
-    all_of_them = "the only actuator" if len(scaled) == 1 else "all actuators, and each of them has one"
+    if shared:
+        what = "the only actuator has" if len(every) == 1 else "all actuators have"
+        return f"{what} a factor in this log, beside a hull that is known from the logs alone and may be off in its manoeuvres"
+    all_of_them = "the only actuator" if len(every) == 1 else "all actuators, and each of them has one"
     return f"without a hull model, a factor on the masses and the damping does the same as one on {all_of_them}"
 
 

@@ -50,6 +50,7 @@ def force_claims(
     library: Sequence[Candidate] = (),
     *,
     hull_known: bool,
+    hull_shared: bool = False,
 ) -> list[Claim]:
     """Return the findings of forces with their figures, that which removes most of the error first.
 
@@ -65,13 +66,22 @@ def force_claims(
         Every candidate, against which a force stands out where the hull is not known.
     hull_known
         Whether the hull comes from elsewhere than this log.
+    hull_shared
+        Whether it comes from this log and several others.
     """
     removed = removed_shares(problem, stands)
+    scales = "" if hull_known else _scaled_throughout(stands, measurements, shared=hull_shared)
     claims = [
-        _force_claim(problem, stands, measurements, i, removed.get(one.key, {}), library, hull_known=hull_known)
+        _force_claim(problem, stands, measurements, i, removed.get(one.key, {}), library, scales, hull_known=hull_known)
         for i, one in enumerate(stands.fit.candidates)
     ]
     return sorted(claims, key=lambda one: -sum(one.finding.improvement.values()))
+
+
+def _scaled_throughout(stands: Elimination, measurements: Measurements, *, shared: bool) -> str:
+    """Return why factors on all actuators throughout a log are no names beside a hull that nobody modelled; else nothing."""
+    lasting = {one.instance for one in stands.fit.candidates if one.effect.scales and not one.times}
+    return scaled_as_masses(lasting, measurements.profile, shared=shared)
 
 
 def _force_claim(
@@ -81,6 +91,7 @@ def _force_claim(
     i: int,
     removed: Mapping[str, float],
     library: Sequence[Candidate],
+    scales: str,
     *,
     hull_known: bool,
 ) -> Claim:
@@ -127,9 +138,8 @@ def _force_claim(
         beyond = proof.improvement.score_low > feedback_of(problem, kept).high
         figures = replace(figures, beyond_feedback=beyond)
     if not hull_known:
-        lasting = {one.instance for one in kept.candidates if one.effect.scales and not one.times}
         if candidate.effect.scales and not candidate.times:
-            figures = replace(figures, doubt=figures.doubt or scaled_as_masses(lasting, measurements.profile))
+            figures = replace(figures, doubt=figures.doubt or scales)
         figures = replace(
             figures,
             sets_in=sets_in(problem, kept, i),

@@ -83,7 +83,7 @@ def _judged(
     library = () if baseline.joint and several else log.steady
     claims = (
         *sensor_claims(log.estimated.averaged.screened),
-        *force_claims(problem, stands, measurements, library, hull_known=baseline.hull_known),
+        *force_claims(problem, stands, measurements, library, hull_known=baseline.hull_known, hull_shared=several),
         *disturbance_claims(problem, stands.fit, states, measurements, explained),
         *unknown.claims,
     )

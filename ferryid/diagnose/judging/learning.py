@@ -158,8 +158,8 @@ class Learner:
             if (others := self._that_can_be_fitted()) is not None:
                 stored, learned = others.learn(diagnosed, name, wider)
                 few = len(self.paths) - len(others.paths)
-                without = f"{counted(few, 'log')} that a fit cannot use {verb(few, 'is')} no part of it"
-                return stored, replace(learned, says=f"{learned.says.removesuffix('.')}; {without}.")
+                without = f"{counted(few, 'log')} that a fit cannot use {verb(few, 'is')} no part of that."
+                return stored, replace(learned, says=f"{learned.says.removesuffix('.')}. {without}")
             # What a fit should do instead names options that a diagnosis has not.
             cause = str(error).partition(" Fix: ")[0]
             return diagnosed, Learned(False, f"Nothing was learned beside the findings: {cause.removesuffix('.')}.")

@@ -79,7 +79,7 @@ def doubt(effect: str, **values: float) -> str:
         (
             "waves",
             {"peak_frequency": 0.45, "time_constant": 2.1},
-            "of 2.1 s is shorter than its period of 2.2 s: a sea keeps",
+            "its time constant is 0.94 of its period: a sea is coherent",
         ),
         ("waves", {"peak_frequency": 2.99, "time_constant": 2.3}, "its peak frequency of 2.99 Hz stands at the bound"),
         (
@@ -439,6 +439,11 @@ def test_factors_on_all_actuators_are_one_on_the_masses() -> None:
     assert scaled_as_masses({"thruster1"}, FERRY) == ""
     assert "all actuators, and each of them has one" in scaled_as_masses({"thruster1", "thruster2"}, FERRY)
     assert scaled_as_masses({"propeller"}, load_profile("kvlcc2-model")).endswith("as one on the only actuator")
+    # Other logs have the same hull, and no such factor.
+    assert scaled_as_masses({"propeller"}, load_profile("kvlcc2-model"), shared=True).startswith(
+        "the only actuator has a"
+    )
+    assert scaled_as_masses(set(), FERRY, shared=True) == ""
 
 
 def test_an_interval_over_all_logs_ends_where_the_parameter_does() -> None:

@@ -312,7 +312,7 @@ def test_a_log_that_cannot_be_fitted_leaves_the_others_to_learn_from(windy: tupl
     assert alone is not None
     np.testing.assert_array_equal(stored.theta, alone.theta)
     assert learned.ratio == plain.ratio
-    assert learned.says == f"{plain.says.removesuffix('.')}; 1 log that a fit cannot use is no part of it."
+    assert learned.says == f"{plain.says.removesuffix('.')}. 1 log that a fit cannot use is no part of that."
 
 
 def test_forces_that_are_reversed_beside_the_findings_alone_end_nothing(
