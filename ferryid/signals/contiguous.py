@@ -1,14 +1,16 @@
-"""Short logs that follow each other without a break, such as bags of 20 s of one recording, as one log.
+"""Short logs that follow each other at once, or nearly so, such as bags of 20 s of one recording, as one log.
 
 A recorder that begins a new file every few seconds cuts one recording into pieces. Each piece by itself loses the windows at
 its ends, is too short to hold anything out, and has a wind, a current and a noise of its own for the estimate. Pieces are put
-together before anything else is done with them, which leaves the recording as it would be without the cuts.
+together before anything else is done with them, which leaves the recording as it would be without the cuts. A break is a gap
+in it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from math import ceil
 from pathlib import Path
 
@@ -78,9 +80,11 @@ class Contiguous:
         short, long = min(lengths) / 60.0, max(lengths) / 60.0
         minutes = f"{long:.3g} min" if f"{short:.3g}" == f"{long:.3g}" else f"{short:.3g} to {long:.3g} min"
         count = sum(len(parts) for parts in self.parts.values())
+        breaks = [b.begin_s - a.end_s for parts in self.parts.values() for a, b in pairwise(parts)]
+        how = "without a break" if max(breaks) < SIGNALS.gap_s else f"after breaks of up to {max(breaks):.2g} s"
         return (
-            f"{counted(count, 'log')} that follow each other without a break were joined into "
-            f"{counted(len(self.parts), 'log')} of {minutes}.",
+            f"{counted(count, 'log')} that follow each other {how} were joined into {counted(len(self.parts), 'log')} of "
+            f"{minutes}.",
         )
 
 

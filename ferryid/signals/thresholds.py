@@ -156,10 +156,10 @@ class SignalThresholds:
         "convention: sixty bags of 20 s; wind and current are constant over a log",
     )
     break_s: float = threshold(
-        5.0,
+        30.0,
         "s",
         "longest break between such logs, by clocks that were set",
-        "convention: what a recorder takes to begin anew, in which weather and load stay as they are",
+        "convention: a recorder begins its next file, or is started again by hand, and weather and load stay as they are",
     )
     break_samples: float = threshold(
         2.0,

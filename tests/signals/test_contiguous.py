@@ -54,7 +54,11 @@ def test_the_order_in_which_bags_are_given_does_not_matter(tmp_path: Path) -> No
 @pytest.mark.parametrize(("pause_s", "logs"), [(0.5 * SIGNALS.break_s, 1), (2.0 * SIGNALS.break_s, 2)])
 def test_a_recorder_that_is_restarted_makes_one_log_and_a_pause_two(tmp_path: Path, pause_s: float, logs: int) -> None:
     paths = bags(tmp_path, [0.0, 20.0, 40.0 + pause_s, 60.0 + pause_s])
-    assert len(contiguous(paths, SHIP).paths) == logs
+    found = contiguous(paths, SHIP)
+    assert len(found.paths) == logs
+    (note,) = found.notes
+    assert ("follow each other after breaks of up to 15 s were" in note) == (logs == 1)
+    assert ("follow each other without a break were" in note) == (logs == 2)
 
 
 @pytest.mark.parametrize(("pause_s", "logs"), [(0.0, 1), (1.0, 2)])
