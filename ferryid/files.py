@@ -427,6 +427,38 @@ def resolved(path: str | Path) -> Path:
     return Path(os.path.realpath(path))
 
 
+def exists(path: str | Path) -> bool:
+    """Return whether a path leads to a file or folder; one that is too long for a name, as of many parts, leads nowhere."""
+    try:
+        return Path(path).exists()
+    except OSError as error:
+        if error.errno == errno.ENAMETOOLONG:
+            return False
+        raise
+
+
+def parts_of(log: str) -> list[str]:
+    """Return the paths of the parts of a log, which ``+`` joins; the log's own where there is a file or folder of that name."""
+    return [log] if exists(log) else log.split("+")
+
+
+def existing_parts(text: str) -> list[Path]:
+    """Split a joined path at those ``+`` that leave paths which all exist (a folder's name may hold one too)."""
+    pieces = text.split("+")
+    for count in range(1, len(pieces) + 1):
+        joined = "+".join(pieces[:count])
+        head = Path(joined)
+        # An empty path would be the working folder.
+        if not joined.strip() or not exists(head):
+            continue
+        if count == len(pieces):
+            return [head]
+        tail = existing_parts("+".join(pieces[count:]))
+        if tail:
+            return [head, *tail]
+    return []
+
+
 def check_result(path: Path) -> bool:
     """Refuse a place for a JSON result that holds anything but an earlier one; tell whether it is a device.
 

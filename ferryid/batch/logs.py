@@ -12,8 +12,8 @@ from pathlib import Path
 from ferryid.batch.log_result import LogFile
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError, did_you_mean
-from ferryid.files import resolved
-from ferryid.ingest import existing_parts, log_suffixes
+from ferryid.files import existing_parts, exists, resolved
+from ferryid.ingest import log_suffixes
 
 COLUMNS = ("log", "vessel", "date", "note")
 """Of a manifest that is a table; `log` is what makes it one."""
@@ -56,7 +56,9 @@ class Entry:
     def paths(self) -> list[Path]:
         """Absolute paths of its parts; of what is not there, where it should be."""
         whole = Path(self.log)
-        parts = [] if whole.exists() else existing_parts(self.log)
+        # One name that no file can have is an error; of parts the names together may be as long.
+        there = exists(whole) if "+" in self.log else whole.exists()
+        parts = [] if there else existing_parts(self.log)
         return [resolved(part) for part in parts or [whole]]
 
     @property

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +23,7 @@ from ferryid.files import resolved
 from ferryid.models import Model
 from ferryid.side_by_side import over
 from ferryid.signals.artificial import NO_RECORDING
+from ferryid.signals.contiguous import Contiguous, LogPart, contiguous
 from ferryid.signals.order_of_time import dated
 from ferryid.signals.usable import left_out_of, tried
 from ferryid.types import RunContext
@@ -38,26 +39,35 @@ SHOWN_OVERLAPS = 3
 class Gathered:
     """Logs that can be used, measured, screened and averaged, and sentences on the others and on all.
 
-    `copies` are logs that are left out since they hold the motion of another: their paths and that of the other.
+    `copies` are logs that are left out since they hold the motion of another: their paths and that of the other. `parts` are
+    those of every log that is made of several, by its path.
     """
 
     logs: tuple[AveragedLog, ...]
     notes: tuple[str, ...] = ()
     copies: tuple[tuple[str, str], ...] = ()
+    parts: Mapping[str, tuple[LogPart, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Group:
-    """Logs with one hull, the references that bring it too, what a reader must know of them, and the campaign's copies."""
+    """Logs with one hull, the references that bring it too, what a reader must know of them; `copies`, `parts` as gathered."""
 
     logs: tuple[AveragedLog, ...]
     references: tuple[AveragedLog, ...] = ()
     notes: tuple[str, ...] = ()
     copies: tuple[tuple[str, str], ...] = ()
+    parts: Mapping[str, tuple[LogPart, ...]] = field(default_factory=dict)
 
 
 def gather(
-    paths: Sequence[str], profile: Profile, run: RunContext, *, withhold: Sequence[str] = (), references: bool = False
+    paths: Sequence[str],
+    profile: Profile,
+    run: RunContext,
+    *,
+    withhold: Sequence[str] = (),
+    references: bool = False,
+    join: bool = False,
 ) -> Gathered:
     """Return the logs of a campaign that can be used, and why each of the others cannot.
 
@@ -71,6 +81,8 @@ def gather(
         Signals to hide.
     references
         True where they only bring the hull; the sentences then name them so.
+    join
+        Put short logs together that follow each other without a break (`ferryid.signals.contiguous`).
 
     Raises
     ------
@@ -83,13 +95,21 @@ def gather(
         return average(screen_sensors(measured, run.progress))
 
     given, paths = list(paths), list({_resolved(path): path for path in reversed(paths)}.values())[::-1]
-    made = over(lambda path: tried(screened, path), paths)
-    found = [one for one in made if isinstance(one, AveragedLog)]
-    errors = {path: one for path, one in zip(paths, made, strict=True) if isinstance(one, FerryIdError)}
+    # Seconds count from the start of each log as it was given.
+    joined = contiguous(paths, profile) if join and not run.ranges else Contiguous(tuple(paths), {})
+    made = dict(zip(joined.paths, over(lambda path: tried(screened, path), joined.paths), strict=True))
+    broken = [path for path in joined.parts if isinstance(made[path], FerryIdError)]
+    if broken:
+        # A part that cannot be used takes no other with it.
+        joined = joined.without(broken)
+        again = [path for path in joined.paths if path not in made]
+        made |= zip(again, over(lambda path: tried(screened, path), again), strict=True)
+    found = [one for one in (made[path] for path in joined.paths) if isinstance(one, AveragedLog)]
+    errors = {path: one for path in joined.paths if isinstance(one := made[path], FerryIdError)}
     if not found:
         raise next(iter(errors.values()))
     whose = "references" if references else "campaign"
-    notes = [*left_out_of(whose, errors)]
+    notes = [*joined.notes, *left_out_of(whose, errors)]
     notes += [
         f"Given twice: {path}: it counts once"
         for path in dict.fromkeys(given)
@@ -97,10 +117,10 @@ def gather(
     ]
     kept, why = sort_out(found, whose)
     copies = tuple(repeated(kept))
-    again = {path for path, _ in copies}
-    kept = [one for one in kept if one.path not in again]
+    copied = {path for path, _ in copies}
+    kept = [one for one in kept if one.path not in copied]
     why += [_copied(path, other, whose) for path, other in copies]
-    return Gathered(tuple(kept), (*notes, *why, *_clocks(kept)), copies)
+    return Gathered(tuple(kept), (*notes, *why, *_clocks(kept)), copies, joined.parts)
 
 
 def _resolved(path: str) -> tuple[str, ...]:
@@ -230,7 +250,8 @@ def part(gathered: Gathered, references: Gathered, profile: Profile, model: Mode
 
 def _parts(gathered: Gathered, references: Gathered, profile: Profile, model: Model | None) -> tuple[Group, ...]:
     """Return the same without a word on what is made of them."""
-    every = Group(gathered.logs, references.logs, (*gathered.notes, *references.notes), gathered.copies)
+    notes = (*gathered.notes, *references.notes)
+    every = Group(gathered.logs, references.logs, notes, gathered.copies, gathered.parts)
     open_groups, closed = [every], list[Group]()
     while open_groups:
         group = open_groups.pop()
@@ -247,10 +268,11 @@ def whole(gathered: Gathered, profile: Profile, model: Model | None) -> Gathered
     """Return logs that are compared as one group, without one that no common hull fits; more of them stay, with a note."""
     groups = _parts(gathered, Gathered(()), profile, model)
     if len(groups) == 1:
-        return Gathered(groups[0].logs, groups[0].notes, gathered.copies)
+        return replace(gathered, logs=groups[0].logs, notes=groups[0].notes)
     left = {one.path for group in groups for one in group.logs}
     kept = tuple(one for one in gathered.logs if one.path in left)
-    return Gathered(kept, (*dict.fromkeys(note for group in groups for note in group.notes), STAY), gathered.copies)
+    notes = (*dict.fromkeys(note for group in groups for note in group.notes), STAY)
+    return replace(gathered, logs=kept, notes=notes)
 
 
 def _parted(group: Group, profile: Profile, model: Model | None) -> list[Group]:

@@ -30,7 +30,7 @@ from ferryid.diagnose.judging.model_update import store_updated_model
 from ferryid.diagnose.second_sources import compare_second_sources
 from ferryid.effects.wording import listed
 from ferryid.errors import FerryIdError, did_you_mean
-from ferryid.files import resolved
+from ferryid.files import parts_of, resolved
 from ferryid.freed import give_back
 from ferryid.models import Model
 from ferryid.models.store import check_name
@@ -95,6 +95,8 @@ def diagnose_campaign(
     profile: Profile,
     settings: DiagnosisSettings,
     run: RunContext,
+    *,
+    join: bool = False,
 ) -> tuple[Diagnosis, ...]:
     """Diagnose the logs of a campaign; one log is a campaign of one.
 
@@ -108,6 +110,8 @@ def diagnose_campaign(
         What the logs are compared with, and which signals are hidden.
     run
         Folder of the ingested tables, progress, and whether to check every checksum of the logs.
+    join
+        Diagnose short logs that follow each other without a break as one, whose `parts` they are.
 
     Raises
     ------
@@ -115,29 +119,38 @@ def diagnose_campaign(
         Where no log can be used. Of several, those that cannot are left out, and the notes name them.
     """
     profile = settings.recorded(profile)
-    groups = _groups(logs, _references(logs, profile, settings, run), profile, settings, run)
-    found = _diagnosed(groups, profile, settings, run)
-    return tuple(sorted(found, key=lambda one: list(logs).index(one.path)))
+    references = _references(logs, profile, settings, run, join=join)
+    found = _diagnosed(_groups(logs, references, profile, settings, run, join=join), profile, settings, run)
+    place = {path: k for k, path in reversed(list(enumerate(logs)))}
+    return tuple(sorted(found, key=lambda one: min(place[path] for path in one.paths)))
 
 
-def _references(logs: Sequence[str], profile: Profile, settings: DiagnosisSettings, run: RunContext) -> Gathered:
+def _references(
+    logs: Sequence[str], profile: Profile, settings: DiagnosisSettings, run: RunContext, *, join: bool = False
+) -> Gathered:
     """Return the recordings that bring the hull; read once, for all logs."""
     if not settings.reference:
         return Gathered(())
     own = {resolved(part) for log in logs for part in (log, *log.split("+"))}
     for one in settings.reference:
-        if resolved(one) in own:
+        if any(resolved(part) in own for part in parts_of(one)):
             raise FerryIdError(
                 f"--reference: {one}: it is one of the logs to be diagnosed. Fix: give it as a log or as a reference"
             )
-    return gather(settings.reference, profile, run, references=True)
+    return gather(settings.reference, profile, run, references=True, join=join)
 
 
 def _groups(
-    logs: Sequence[str], references: Gathered, profile: Profile, settings: DiagnosisSettings, run: RunContext
+    logs: Sequence[str],
+    references: Gathered,
+    profile: Profile,
+    settings: DiagnosisSettings,
+    run: RunContext,
+    *,
+    join: bool = False,
 ) -> tuple[Group, ...]:
     """Return the logs that can be used, in groups of one hull each."""
-    gathered = gather(logs, profile, run, withhold=settings.withhold)
+    gathered = gather(logs, profile, run, withhold=settings.withhold, join=join)
     if settings.against is not None:
         return (Group(gathered.logs, notes=gathered.notes, copies=gathered.copies),)
     if references.logs:
@@ -171,6 +184,7 @@ def _diagnosed(
                 one,
                 latest=k == len(groups) - 1,
                 copies=group.copies,
+                parts=group.parts.get(one.path, ()),
                 sources=sources,
                 withheld=with_gains(one.withheld, gains, told=len(made) == 1),
             )
@@ -232,7 +246,7 @@ def diagnose(
     """
     settings.check()
     if not settings.each and settings.against is None:
-        return distinguished(diagnose_campaign(logs, profile, settings, run))
+        return distinguished(diagnose_campaign(logs, profile, settings, run, join=True))
     profile = settings.recorded(profile)
     references = _references(logs, profile, settings, run)
 

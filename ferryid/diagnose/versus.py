@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from ferryid.counts import counted
@@ -26,7 +25,7 @@ from ferryid.diagnose.judging.group_loads import LoadDifference
 from ferryid.diagnose.judging.sensor_differences import sensor_differences
 from ferryid.diagnose.pipeline import DiagnosisSettings
 from ferryid.errors import FerryIdError
-from ferryid.files import resolved
+from ferryid.files import parts_of, resolved
 from ferryid.types import RunContext
 from ferryid.vessel.profile import Profile
 
@@ -150,15 +149,11 @@ def _check(logs: Sequence[str], versus: Sequence[str], settings: DiagnosisSettin
     for name, group in zip(GROUPS, (logs, versus), strict=True):
         if not group:
             raise FerryIdError(f"diagnose: group {name} has no log. Fix: give logs before --versus and after it")
-    first = {resolved(part): part for one in logs for part in _parts(one)}
+    first = {resolved(part): part for one in logs for part in parts_of(one)}
     for one in versus:
-        for part in _parts(one):
+        for part in parts_of(one):
             if resolved(part) in first:
                 raise FerryIdError(f"{part}: stands on both sides of --versus. Fix: give each log to one side")
-
-
-def _parts(log: str) -> list[str]:
-    return [log] if Path(log).exists() else log.split("+")
 
 
 def _group_log(log: AveragedLog) -> GroupLog:

@@ -15,7 +15,7 @@ from ferryid.export.findings import diagnostics, finding_values, read_diagnosis,
 from ferryid.export.frames import BODY, WORLD, transform_streams
 from ferryid.export.layouts import check_layouts, foxglove, layout_files, plotjuggler
 from ferryid.export.model_file import SCHEMA
-from ferryid.files import replacing, resolved, write_text
+from ferryid.files import parts_of, replacing, resolved, write_text
 from ferryid.models import Model
 from ferryid.models.forces import base_force
 from ferryid.models.prediction import Prediction, predict, predict_base, signal_map
@@ -154,7 +154,7 @@ def export_log(
 def _check_place(log: str, mcap: Path, *, overwrite: bool) -> None:
     if mcap.suffix.lower() != ".mcap":
         raise FerryIdError(f'{mcap}: is written as MCAP, found the suffix "{mcap.suffix}". Fix: end the name in .mcap')
-    read = [Path(log)] if Path(log).exists() else [Path(part) for part in log.split("+")]
+    read = [Path(part) for part in parts_of(log)]
     for one in read:
         # A file more in the folder of a recording would be read as a part of it.
         if one.is_dir() and resolved(mcap).is_relative_to(resolved(one)):

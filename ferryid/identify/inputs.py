@@ -12,6 +12,7 @@ from ferryid.identify.force_signs import ForceResponse, force_response, unengage
 from ferryid.identify.motion_data import prepared_data
 from ferryid.identify.settings import FitSettings
 from ferryid.signals.consistency import comparable
+from ferryid.signals.contiguous import Contiguous, contiguous
 from ferryid.signals.copies import GivenLogs
 from ferryid.signals.order_of_time import in_order
 from ferryid.signals.prepare import Opened, open_track, smoothed
@@ -53,11 +54,14 @@ class UsableLogs:
         Why each of the others is left out, as sentences.
     paths
         Those of the logs, in the order in which they were given.
+    notes
+        Which short logs are used as one, as a sentence.
     """
 
     opened: list[Opened]
     left_out: tuple[str, ...] = ()
     paths: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def beside(self, error: FerryIdError) -> str:
         """Return the message of what a fit of these logs was refused for, and that it was without the others."""
@@ -75,13 +79,36 @@ def usable_logs(
 ) -> UsableLogs:
     """Read several logs as `read_logs` does, without those that a fit cannot use and those whose actuators were not engaged.
 
-    `whole` is what the others are left out of, as their sentences say.
+    Short ones that follow each other without a break are read as one (`ferryid.signals.contiguous`), unless one of these cannot
+    be used. `whole` is what logs are left out of, as their sentences say.
 
     Raises
     ------
     FerryIdError
         Where none can be used, for a path that leads nowhere, and for a log that is given twice.
     """
+    # Seconds count from the start of each log as it was given.
+    joined = Contiguous(tuple(paths), {}) if run.ranges else contiguous(paths, profile)
+    errors: dict[str, FerryIdError] = {}
+    try:
+        found = _usable(joined.paths, profile, settings, run, errors)
+        refused = bool(joined.parts.keys() & errors.keys())
+    except FerryIdError:
+        if not joined.parts:
+            raise
+        refused = True
+    if refused:
+        # A part that cannot be used takes no other with it.
+        joined, errors = Contiguous(tuple(paths), {}), {}
+        found = _usable(paths, profile, settings, run, errors)
+    kept = tuple(path for path, _ in found)
+    return UsableLogs(_in_time([one for _, one in found]), left_out_of(whole, errors), kept, joined.notes)
+
+
+def _usable(
+    paths: Sequence[str], profile: Profile, settings: FitSettings, run: RunContext, errors: dict[str, FerryIdError]
+) -> list[tuple[str, Opened]]:
+    """Return the logs of `usable_logs` with their paths, and put the errors of the others into `errors`."""
     read, alone = _reader(profile, settings, run), len(paths) == 1
     responses: dict[str, ForceResponse | None] = {}
 
@@ -91,11 +118,9 @@ def usable_logs(
             responses[path] = _response(one, profile, settings)
         return path, one
 
-    errors: dict[str, FerryIdError] = {}
     found = list(usable(paths, examined, errors, lambda made: comparable(made[1].track)))
-    errors |= {path: FerryIdError(f"{path}: {why}") for path, why in unengaged(responses, profile).items()}
-    kept = [(path, one) for path, one in found if path not in errors]
-    return UsableLogs(_in_time([one for _, one in kept]), left_out_of(whole, errors), tuple(path for path, _ in kept))
+    errors.update({path: FerryIdError(f"{path}: {why}") for path, why in unengaged(responses, profile).items()})
+    return [(path, one) for path, one in found if path not in errors]
 
 
 def _response(one: Opened, profile: Profile, settings: FitSettings) -> ForceResponse | None:

@@ -229,6 +229,8 @@ class FitOutcome:
         What spoke for each kind of these that was considered.
     estimators
         How well either estimator predicts, where a fit chose between them.
+    notes
+        What else there is to know of the logs, as sentences.
     """
 
     model: Model
@@ -246,6 +248,7 @@ class FitOutcome:
     winds: tuple[LogWind, ...] = ()
     conditions: tuple[LogCondition, ...] = ()
     condition_kinds: tuple[KindOutcome, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def base_fits_already(self) -> float | None:

@@ -80,7 +80,7 @@ def fit_logs(
         if not logs.left_out:
             raise
         raise type(error)(logs.beside(error)) from error
-    return replace(outcome, warnings=(*outcome.warnings, *logs.left_out))
+    return replace(outcome, warnings=(*outcome.warnings, *logs.left_out), notes=logs.notes)
 
 
 def fit_opened(

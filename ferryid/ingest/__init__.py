@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError
+from ferryid.files import existing_parts, exists
 from ferryid.ingest import formats
 from ferryid.ingest.log import Format, Reader, TableLayout
 from ferryid.ingest.other_formats import unread_file, unread_text
@@ -57,15 +58,15 @@ def open_log(path: str | Path, layout: TableLayout | None = None) -> Reader:
 def _open(path: str | Path, layout: TableLayout | None) -> Reader:
     whole = Path(path)
     try:
-        whole.exists()
+        found = exists(whole)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise FerryIdError(
             f"{str(path)[:80]!r}: this cannot be a path ({reason}), a log was to be read. Fix: check the path"
         ) from error
-    if not whole.exists() and "+" in str(path):
+    if not found and "+" in str(path):
         return _open_parts(str(path), existing_parts(str(path)), layout)
-    if not whole.exists():
+    if not found:
         raise FerryIdError(f"{path}: no such file or folder, a log was to be read. Fix: check the path")
     if whole.is_dir():
         return _open_folder(whole, layout)
@@ -74,29 +75,12 @@ def _open(path: str | Path, layout: TableLayout | None) -> Reader:
     return _open_file(whole, layout)
 
 
-def existing_parts(text: str) -> list[Path]:
-    """Split a joined path at those ``+`` that leave paths which all exist (a folder's name may hold one too)."""
-    pieces = text.split("+")
-    for count in range(1, len(pieces) + 1):
-        joined = "+".join(pieces[:count])
-        head = Path(joined)
-        # An empty path would be the working folder.
-        if not joined.strip() or not head.exists():
-            continue
-        if count == len(pieces):
-            return [head]
-        tail = existing_parts("+".join(pieces[count:]))
-        if tail:
-            return [head, *tail]
-    return []
-
-
 def _open_parts(text: str, parts: list[Path], layout: TableLayout | None) -> Reader:
     if not parts:
         missing = [
             piece if piece.strip() else "a name beside a +"
             for piece in text.split("+")
-            if not piece.strip() or not Path(piece).exists()
+            if not piece.strip() or not exists(piece)
         ]
         raise FerryIdError(
             f"{text}: no such file, and as parts joined by + it lacks {', '.join(missing)}. "

@@ -17,6 +17,7 @@ from ferryid.diagnose import (
     diagnose_and_store,
     finding_as_json,
     likeness_as_json,
+    parts_as_json,
     to_json,
 )
 from ferryid.errors import FerryIdError
@@ -117,7 +118,9 @@ def report(
     FerryIdError
         For a folder that cannot be written; nothing half-written is left.
     """
-    place = place_of(out / "reports", _folder(diagnoses), [one.path for one in diagnoses if one.path], command)
+    place = place_of(
+        out / "reports", _folder(diagnoses), [path for one in diagnoses for path in one.paths if path], command
+    )
     names = ", ".join(one.log for one in diagnoses[:2]) + (
         f" and {len(diagnoses) - 2} more" if len(diagnoses) > 2 else ""
     )
@@ -133,11 +136,17 @@ def as_json(diagnoses: Sequence[Diagnosis]) -> dict[str, Any]:
     """Return one object in the form of schema ``ferryid.diagnosis/1``, on one log or several.
 
     On several, `findings` holds those of all logs, each with its ``log``, null for what all of them share; errors are pooled
-    over their rows where these are known; and ``logs`` holds the diagnosis of each.
+    over their rows where these are known; and ``logs`` holds the diagnosis of each. Logs that follow each other without a break
+    are diagnosed as one: ``logs`` holds what was found in each as it was given, and ``joined`` which are parts of what.
     """
-    if len(diagnoses) == 1:
+    if len(diagnoses) == 1 and not diagnoses[0].parts:
         return to_json(diagnoses[0])
-    logs, shared = [to_json(one) for one in diagnoses], findings_of_all(diagnoses)
+    if len(diagnoses) == 1:
+        whole = to_json(diagnoses[0])
+        findings = [{**one, "log": None} for one in whole["findings"]]
+        return {**whole, "log": None, "findings": findings, **_joined(diagnoses), "logs": parts_as_json(diagnoses[0])}
+    logs = [one for each in diagnoses for one in (parts_as_json(each) if each.parts else [to_json(each)])]
+    shared = findings_of_all(diagnoses)
     for one in logs:
         # They are the campaign's.
         one.pop("copies", None)
@@ -168,8 +177,22 @@ def as_json(diagnoses: Sequence[Diagnosis]) -> dict[str, Any]:
         **next(({"likeness": likeness_as_json(one.likeness_of_all)} for one in diagnoses if one.likeness_of_all), {}),
         # What several logs teach is one model.
         "model": next((one.model for one in diagnoses if one.model), None),
+        **_joined(diagnoses),
         "logs": [{key: value for key, value in one.items() if key != "schema"} for one in logs],
     }
+
+
+def _joined(diagnoses: Sequence[Diagnosis]) -> dict[str, Any]:
+    """Return ``joined`` of a campaign: of every log that was made of several, these and when they begin and end in it [s]."""
+    joined = [
+        {
+            "log": one.log,
+            "parts": [{"path": part.path, "begin_s": part.begin_s, "end_s": part.end_s} for part in one.parts],
+        }
+        for one in diagnoses
+        if one.parts
+    ]
+    return {"joined": joined} if joined else {}
 
 
 def _pooled(diagnoses: Sequence[Diagnosis], part: str) -> dict[str, float | None]:

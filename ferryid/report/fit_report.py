@@ -152,6 +152,7 @@ def as_json(result: FitOutcome, stored: StoredModel, report: Path | None) -> dic
         "reasons": list(result.acceptance.reasons),
         "acceptance": result.acceptance.to_json(),
         "warnings": list(result.warnings),
+        **({"notes": list(result.notes)} if result.notes else {}),
         "scores": result.scores.to_json(),
         "settings": {**model.settings, **model.scale},
         "free_run": {
@@ -220,6 +221,7 @@ def as_text(result: FitOutcome, stored: StoredModel, report: Path | None) -> str
         lines.append(f"conditions of single logs beside the wind: none estimated of {left}")
     lines.extend([""] if result.estimators or result.winds or result.condition_kinds else [])
     lines.extend(f"warning: {warning}" for warning in result.warnings)
+    lines.extend(f"note: {note}" for note in result.notes)
     state = "current" if stored.current else ("stored" if model.accepted else "stored, marked as rejected")
     if stored.current and stored.previous not in (None, model.version):
         state += f"; before it was @{stored.previous}, compare them on a log that neither was trained on"

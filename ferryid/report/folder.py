@@ -14,7 +14,7 @@ from textwrap import shorten
 from typing import Any
 
 from ferryid import __version__
-from ferryid.files import dump_json, replacing, resolved
+from ferryid.files import dump_json, parts_of, replacing, resolved
 
 PAGE = "report.html"
 _CHARSET = '<meta charset="utf-8">'
@@ -77,12 +77,8 @@ def place_of(reports: Path, name: str, logs: Sequence[str], command: Sequence[st
 
 
 def _digest(logs: Sequence[str]) -> str:
-    paths = sorted("+".join(str(resolved(part)) for part in _parts(log)) for log in logs)
+    paths = sorted("+".join(str(resolved(part)) for part in parts_of(log)) for log in logs)
     return hashlib.sha256("\n".join(paths).encode(errors="surrogateescape")).hexdigest()[:8]
-
-
-def _parts(log: str) -> list[str]:
-    return [log] if Path(log).exists() else log.split("+")
 
 
 def _made_of(folder: Path) -> tuple[str, str]:

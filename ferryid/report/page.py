@@ -147,6 +147,7 @@ def _context(result: FitOutcome, interactive: Interactive, drawings: Drawings) -
         ],
         "checks_held": _held([check.passed for check in verdict.checks]),
         "warnings": result.warnings,
+        "notes": result.notes,
         "axes": AXES,
         "score_rows": _score_rows(result.scores.force),
         "refitted": "estimated_from" in result.model.settings,

@@ -12,7 +12,7 @@ import numpy as np
 
 from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError
-from ferryid.files import resolved
+from ferryid.files import exists, resolved
 from ferryid.ingest import log_suffixes, open_log
 from ferryid.ingest.clocks import ClockReport, Rows, repair_all
 from ferryid.ingest.hashing import content_hash
@@ -61,7 +61,7 @@ def record(
 def _whole(path: str | Path, profile: Profile, out: Path | None, *, verify: bool) -> Recording:
     name = log_name(path)
     damage: cache.Damage = {}
-    if out is not None and Path(path).is_file():
+    if out is not None and exists(path) and Path(path).is_file():
         kept = cache.by_files(out, name, [Path(path)], profile, damage, verify=verify)
         if kept is not None:
             return kept
@@ -224,7 +224,7 @@ def _log_notes(streams: Mapping[str, Stream], selection: Selection, topics: tupl
 def log_name(path: str | Path) -> str:
     """Name of a log for folders and reports: file or folder name without suffixes, parts counted."""
     text = str(path)
-    first, _, more = text.partition("+") if not Path(text).exists() else (text, "", "")
+    first, _, more = text.partition("+") if not exists(text) else (text, "", "")
     file = resolved(first)
     stem = file.stem if file.suffix in {Path(f"_{suffix}").suffix for suffix in log_suffixes()} else file.name
     clean = re.sub(r"[^A-Za-z0-9._-]+", "_", stem).strip("._") or "log"

@@ -158,6 +158,36 @@ class SignalThresholds:
         "earlier times count from the start of the log or are of a clock that was not set",
         "derived: the year 2000, after the dates at which clocks begin (1970, 1980) and before any log",
     )
+    short_windows: float = threshold(
+        15.0,
+        "windows",
+        "length of a log below which it is joined to one that it follows without a break",
+        "derived: 60 windows that begin a quarter of one apart, below which nothing is tested (`fewest_windows`)",
+    )
+    short_s: float = threshold(
+        120.0,
+        "s",
+        "the same of small vessels, whose windows are short",
+        "convention: a bag of a minute, with room; too short to hold out more than one manoeuvre",
+    )
+    joined_s: float = threshold(
+        1200.0,
+        "s",
+        "longest log that is made of such logs",
+        "convention: sixty bags of 20 s; wind and current are constant over a log",
+    )
+    break_s: float = threshold(
+        30.0,
+        "s",
+        "longest break between such logs, by clocks that were set",
+        "convention: a recorder begins its next file, or is started again by hand, and weather and load stay as they are",
+    )
+    break_samples: float = threshold(
+        2.0,
+        "samples",
+        "the same where times are no dates",
+        "derived: the next sample but for jitter; logs that have nothing to do with each other hardly meet so closely",
+    )
     position_step_m: float = threshold(
         1.0,
         "m",

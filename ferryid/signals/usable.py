@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from ferryid.errors import ContradictionError, FerryIdError, UnwritableError
+from ferryid.files import exists, parts_of
 from ferryid.signals.copies import GivenTwiceError
 
 Made = TypeVar("Made")
@@ -14,7 +15,7 @@ Made = TypeVar("Made")
 
 def leads_somewhere(path: str) -> bool:
     """Return whether the path of a log, or those of all of its parts joined by ``+``, exist."""
-    return Path(path).exists() or all(Path(part).exists() for part in path.split("+"))
+    return all(exists(part) for part in parts_of(path))
 
 
 def tried(work: Callable[[str], Made], path: str) -> Made | FerryIdError:

@@ -12,7 +12,7 @@ from typing import Any
 
 from ferryid.cached import cached_property
 from ferryid.errors import FerryIdError
-from ferryid.ingest import existing_parts
+from ferryid.files import existing_parts, exists
 from ferryid.ingest.remote import copies_folder
 from ferryid.vessel.toml_lines import KeyPath, key_lines, line_of, too_deep
 
@@ -79,9 +79,9 @@ def log_folder(log: str) -> Path:
     """
     path = Path(log)
     try:
-        if not path.exists():
+        if not exists(path):
             path = next(iter(existing_parts(log)), path)
-            while glob.has_magic(str(path)) and not path.exists():
+            while glob.has_magic(str(path)) and not exists(path):
                 path = path.parent
         # The name of a link counts, not what it leads to: settings lie beside what was named.
         path = Path(os.path.abspath(path))

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from ferryid.signals.prepare import Opened, open_track
 from ferryid.signals.smooth import Measured
 from ferryid.types import RunContext
 from ferryid.vessel import load_profile
+from tests.bags import cut
 from tests.identify.rounds import PROFILE, recorded_as
 from tests.identify.trials import measured
 
@@ -184,6 +186,30 @@ def test_logs_most_of_which_show_the_same_are_the_profiles_fault(given: Given) -
 def test_a_log_whose_forces_are_reversed_is_not_taken_for_one_without_engaged_actuators(given: Given) -> None:
     turned = replace(sound(3), tau=-sound(3).tau)
     assert not inputs.usable_logs(given({"one": sound(1), "turned": turned}), PROFILE, QUICK, NOWHERE).left_out
+
+
+def test_bags_that_follow_each_other_are_read_as_one_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    ferry, run = load_profile("milliampere"), RunContext(tmp_path / "out")
+    bags = cut(FIXTURES / "short.mcap", 4, folder=tmp_path)
+    found = inputs.usable_logs(bags, ferry, QUICK, run)
+    (one,) = found.opened
+    assert one.recording.files == tuple(bags)
+    assert found.notes == ("4 logs that follow each other without a break were joined into 1 log of 1.33 min.",)
+    # Seconds count from the start of each log as it was given.
+    some = replace(run, ranges=((2.0, 18.0),))
+    assert len(inputs.usable_logs(bags, ferry, QUICK, some).opened) == 4
+    read = inputs.open_track
+
+    def refused(path: str, *others: Any, **more: Any) -> Opened:
+        if bags[1] in path:
+            raise FerryIdError(f"{bags[1]}: cannot be used")
+        return read(path, *others, **more)
+
+    monkeypatch.setattr(inputs, "open_track", refused)
+    found = inputs.usable_logs(bags, ferry, QUICK, run)
+    assert [one.recording.files for one in found.opened] == [(bags[0],), (bags[2],), (bags[3],)]
+    assert bags[1] in found.left_out[0]
+    assert not found.notes
 
 
 @pytest.mark.slow

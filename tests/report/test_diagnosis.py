@@ -54,6 +54,7 @@ from ferryid.report.diagnosis_words import (
 from ferryid.report.evaluation_text import NOT_ACCEPTED
 from ferryid.report.figures import STYLE, canvas
 from ferryid.report.least_sizes import proof
+from ferryid.signals.contiguous import LogPart
 from ferryid.types import AXES
 from ferryid.vessel import load_profile
 from tests.report.pages import needs_nothing
@@ -346,6 +347,31 @@ def test_copies_stand_once_in_the_json_of_a_campaign() -> None:
     schema = json.loads(files("ferryid.schemas").joinpath("diagnosis.json").read_text(encoding="utf-8"))
     for several in (logs, logs[:1]):
         jsonschema.validate(json.loads(json.dumps({**as_json(several), "report": "x"})), schema)
+
+
+def test_a_joined_log_has_a_diagnosis_of_each_of_the_logs_that_were_given() -> None:
+    parts = tuple(LogPart(f"bags/bag{k}.mcap", 20.0 * k, 20.0 * k + 19.9) for k in range(3))
+    one = replace(
+        diagnosis("explained"), log="bag0-and-2-more", path="+".join(part.path for part in parts), parts=parts
+    )
+    late = replace(
+        wind(), onset_s=25.0, intervals=((25.0, 59.9),), parameters={"onset": Estimate(25.0, 24.0, 27.0, "s")}
+    )
+    one = replace(one, findings=(late,))
+    schema = json.loads(files("ferryid.schemas").joinpath("diagnosis.json").read_text(encoding="utf-8"))
+    for told in (as_json([one]), as_json([one, diagnosis("explained")])):
+        jsonschema.validate(json.loads(json.dumps({**told, "report": "x"})), schema)
+        assert [part["path"] for part in told["joined"][0]["parts"]] == [part.path for part in parts]
+        assert [each["log"] for each in told["logs"]][:3] == ["bag0.mcap", "bag1.mcap", "bag2.mcap"]
+        assert all(each["joined"] == one.log and each["verdict"] == one.verdict for each in told["logs"][:3])
+    before, begins, acts = as_json([one])["logs"]
+    assert before["findings"] == []
+    (found,) = begins["findings"]
+    assert (found["where"]["onset"], found["where"]["intervals"]) == (5.0, [[5.0, pytest.approx(19.9)]])
+    assert found["parameters"]["onset"] == {"value": 5.0, "low": 4.0, "high": 7.0, "unit": "s"}
+    (found,) = acts["findings"]
+    assert (found["where"]["onset"], found["where"]["intervals"]) == (None, [[0.0, pytest.approx(19.9)]])
+    assert found["parameters"] == {}
 
 
 def test_a_finding_is_told_in_numbers() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from math import atan2, degrees, hypot, isfinite
+from math import atan2, degrees, hypot, inf, isfinite
 from pathlib import PurePath
 from typing import Any
 
@@ -20,6 +20,7 @@ from ferryid.diagnose.judging.locate import Location, plain_location
 from ferryid.diagnose.judging.posterior import Posterior
 from ferryid.diagnose.judging.verdict import Remainder
 from ferryid.diagnose.second_sources import SecondSources
+from ferryid.signals.contiguous import LogPart
 from ferryid.signals.track import LeftOut
 from ferryid.types import Floats
 
@@ -121,7 +122,7 @@ class Diagnosis:
     learned
         What a fit learned beside the findings; None where nothing was to be learned.
     path
-        Of the log, as it was given.
+        Of the log, as it was given; those of its parts joined by ``+``.
     profile
         Name or path that the vessel's profile is given by; empty where it is known from a model alone.
     copies
@@ -140,6 +141,8 @@ class Diagnosis:
         False for a log of an earlier hull than the one that a model is stored of, where no common hull fits a campaign.
     least_sizes
         Of effects that were tested and not found: from which size on the log would have shown them.
+    parts
+        The logs that were given, where it is made of several that follow each other without a break.
     """
 
     log: str
@@ -172,6 +175,12 @@ class Diagnosis:
     gathered: tuple[str, ...] = ()
     latest: bool = True
     least_sizes: tuple[LeastSize, ...] = ()
+    parts: tuple[LogPart, ...] = ()
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Paths of the logs that it is of, as they were given."""
+        return tuple(one.path for one in self.parts) or (self.path,)
 
 
 def distinguished(diagnoses: Sequence[Diagnosis]) -> tuple[Diagnosis, ...]:
@@ -230,6 +239,67 @@ def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
         **({} if diagnosis.learned is None else {"learned": diagnosis.learned.to_json()}),
         **({"copies": copies} if (copies := copies_as_json([diagnosis])) else {}),
     }
+
+
+def parts_as_json(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """Return the diagnoses of the parts of a joined log, as they stand in ``logs`` of ``ferryid.diagnosis/1``.
+
+    Each has the findings that act in it, with times from its own start; verdict, errors and model are those of the whole.
+    """
+    whole = to_json(diagnosis)
+    kept = ("vessel", "verdict", "before", "after", "model")
+    withheld = [{key: value for key, value in one.items() if key != "over_time"} for one in whole["withheld"]]
+    names = distinct([one.name for one in diagnosis.parts], [one.path for one in diagnosis.parts])
+    return [
+        {
+            "log": name,
+            "joined": diagnosis.log,
+            **{key: whole[key] for key in kept},
+            "findings": [finding_as_json(one) for one in findings_in(diagnosis.findings, part)],
+            "notes": [
+                f"Part of {diagnosis.log}, from {part.begin_s:.1f} to {part.end_s:.1f} s: verdict, errors and "
+                "probabilities are those of that log."
+            ],
+            "withheld": withheld,
+            "duration_s": part.end_s - part.begin_s,
+            "left_out": [],
+            "repairs": [],
+        }
+        for name, part in zip(names, diagnosis.parts, strict=True)
+    ]
+
+
+def findings_in(findings: Sequence[Finding], part: LogPart) -> tuple[Finding, ...]:
+    """Return the findings of a joined log that act in a part of it, with times from the start of that part [s]."""
+    return tuple(moved for one in findings if (moved := _moved(one, part)) is not None)
+
+
+def _moved(finding: Finding, part: LogPart) -> Finding | None:
+    """Return a finding as it acts in a part of its log; None where it does not."""
+    first = -inf if finding.onset_s is None else finding.onset_s
+    last = inf if finding.offset_s is None else finding.offset_s
+    if first >= part.end_s or last <= part.begin_s:
+        return None
+    acts = [(max(a, part.begin_s), min(b, part.end_s)) for a, b in finding.intervals]
+    intervals = tuple((a - part.begin_s, b - part.begin_s) for a, b in acts if b > a)
+    if finding.intervals and not intervals:
+        return None
+    times = {"onset": first > part.begin_s, "offset": last < part.end_s}
+    parameters = {
+        name: replace(one, value=one.value - part.begin_s, low=one.low - part.begin_s, high=one.high - part.begin_s)
+        if name in times
+        else one
+        for name, one in finding.parameters.items()
+        if times.get(name, True)
+    }
+    return replace(
+        finding,
+        parameters=parameters,
+        intervals=intervals,
+        onset_s=first - part.begin_s if times["onset"] and finding.onset_s is not None else None,
+        offset_s=last - part.begin_s if times["offset"] and finding.offset_s is not None else None,
+        course=None,
+    )
 
 
 def copies_as_json(diagnoses: Sequence[Diagnosis]) -> list[dict[str, str]]:

@@ -164,7 +164,7 @@ def sweep_settings(
             found = _sweep_derivative(request.of("derivative"))
     else:
         found = _sweep_derivative(request.of("derivative"))
-    notes = (*found.notes, *given.left_out)
+    notes = (*found.notes, *given.notes, *given.left_out)
     return replace(found, notes=notes, asked=asked, estimator_says=says, estimators=scores)
 
 

@@ -105,7 +105,12 @@ def sweep_structures(
         block_s,
         by,
         unusable,
-        (*_notes(by, settings), *log_warnings([(log["name"], log["warnings"]) for log in told]), *given.left_out),
+        (
+            *_notes(by, settings),
+            *log_warnings([(log["name"], log["warnings"]) for log in told]),
+            *given.notes,
+            *given.left_out,
+        ),
         settings=settings,
         asked=asked,
         estimator_says=says,

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.files import parts_of
 from ferryid.validation.recorded.effects import concealments
 from ferryid.validation.recorded.log import name_of_log
 
@@ -69,7 +70,7 @@ def load_recordings(real: str, vessel: str | None) -> tuple[Recording, ...]:
                 f"{real}: where its signals are is not known, found neither a manifest (.toml) nor --vessel. "
                 "Fix: give --vessel with the profile of this log"
             )
-        if not all(Path(part).exists() for part in ([real] if path.exists() else real.split("+"))):
+        if not all(Path(part).exists() for part in parts_of(real)):
             raise FerryIdError(f"{real}: there is no such log or manifest. Fix: correct the path after --real")
         return (Recording(Path(name_of_log(real)).stem, (real,), vessel),)
     if vessel is not None:
@@ -85,7 +86,7 @@ def fingerprint(recordings: Sequence[Recording]) -> str:
     for one in recordings:
         digest.update(repr((one.name, one.vessel, one.runs, one.only, len(one.before))).encode())
         for log in (*one.logs, *one.before):
-            for part in [log] if Path(log).exists() else log.split("+"):
+            for part in parts_of(log):
                 root = Path(part)
                 files = sorted(path for path in root.rglob("*") if path.is_file()) if root.is_dir() else [root]
                 for file in files:
