@@ -28,6 +28,7 @@ from ferryid.identify.judged_split import judged_split
 from ferryid.identify.log_sums import folds_by_blocks, force_free_axes, sum_log
 from ferryid.identify.model_selection import Selection, select_model, windows_to_try
 from ferryid.identify.motion_data import LogData, numbered_names, prepared_data
+from ferryid.identify.order_responses import estimate_order_responses
 from ferryid.identify.outcome import ComponentCurve, EstimatorScore, Excitation, FitOutcome
 from ferryid.identify.own_conditions import with_own_conditions
 from ferryid.identify.physical_checks import law_of, physical_checks
@@ -87,8 +88,16 @@ def fit_opened(
     opened: Sequence[Opened], profile: Profile, settings: FitSettings, run: RunContext, name: str
 ) -> FitOutcome:
     """Fit a correction of a profile's hull to logs that were read and aligned; arguments and errors as of `fit_logs`."""
-    chosen = estimator_for(opened, profile, settings, run)
-    outcome = fit_and_judge(chosen.data, chosen.components, name, run)
+    run.progress("estimating how orders are followed")
+    responses = estimate_order_responses(opened, profile, settings)
+    try:
+        chosen = estimator_for(opened, profile, settings, run)
+        outcome = fit_and_judge(chosen.data, chosen.components, name, run)
+    except FerryIdError as error:
+        if not responses:
+            raise
+        # What is late may be why.
+        raise type(error)(with_sentence(error, *map(str, responses))) from error
     model = _with_marks(outcome.model, opened)
     judged = model if outcome.judged is outcome.model else _with_marks(outcome.judged, opened)
     told = [f"The derivative's estimator was used: {chosen.why}."] if chosen.why else []
@@ -98,8 +107,9 @@ def fit_opened(
         outcome,
         model=model,
         judged=judged,
-        warnings=(*outcome.warnings, *chosen.notes, *told),
+        warnings=(*map(str, responses), *outcome.warnings, *chosen.notes, *told),
         estimators=chosen.scores,
+        order_responses=responses,
     )
 
 
