@@ -16,7 +16,7 @@ misspecified models, for the intervals.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import log, sqrt
@@ -37,7 +37,7 @@ from ferryid.regression import STRIDES, window_rows, window_sums, window_weights
 from ferryid.signals.feedback import directed_information
 from ferryid.signals.prepare import Opened
 from ferryid.signals.smooth import moving_mean, odd_rows
-from ferryid.types import Floats, Ints
+from ferryid.types import Floats, Ints, no_progress
 from ferryid.vessel import applied_force, follow_orders
 from ferryid.vessel.hull import current_in_body
 from ferryid.vessel.order_response import OrderResponse, followed_orders
@@ -48,7 +48,10 @@ Times = tuple[float, float]
 
 
 def estimate_order_responses(
-    opened: Sequence[Opened], profile: Profile, settings: FitSettings
+    opened: Sequence[Opened],
+    profile: Profile,
+    settings: FitSettings,
+    progress: Callable[[str], None] = no_progress,
 ) -> tuple[EstimatedResponse, ...]:
     """Return how orders are followed of which the profile does not state it; none where the logs do not show it.
 
@@ -60,6 +63,8 @@ def estimate_order_responses(
         Logs, read and aligned.
     profile, settings
         The vessel, and how to fit.
+    progress
+        Is told where something is estimated.
     """
     if settings.residual != "measured" or settings.by_thesis:
         return ()
@@ -71,6 +76,7 @@ def estimate_order_responses(
                 groups[turns][column] = signal.quantity
     if not any(groups.values()):
         return ()
+    progress("estimating how orders are followed")
     try:
         data = prepared_data(profile, settings, opened)
     except FerryIdError:
@@ -199,7 +205,7 @@ class _Problem:
         return float(np.mean(self._ratio(times)))
 
     def _ratio(self, times: Times) -> Floats:
-        return np.asarray(np.mean(self.left(times)[0] ** 2, axis=0) / np.mean(self.at_once**2, axis=0))
+        return _variance(self.left(times)[0]) / _variance(self.at_once)
 
     def estimate(self) -> Times | None:
         """Return the time constant and delay of the orders; None where the logs do not show any."""
@@ -235,7 +241,7 @@ class _Problem:
     def _is_shown(self, times: Times) -> bool:
         """Tell whether times gain more than chance, and than a controller's answer to disturbances could."""
         white, _ = self.left(times)
-        variance = np.mean(white**2, axis=0)
+        variance = _variance(white)
         sums = self._block_sums(0.5 * np.sum((self.at_once**2 - white**2) / variance, axis=1))
         low = float(np.sum(sums)) - 1.96 * sqrt(len(sums) * float(np.var(sums, ddof=1)))
         ordered = np.concatenate([one[rows] for one, rows in zip(self.forces((0.0, 0.0)), self.rows, strict=True)])
@@ -254,7 +260,7 @@ class _Problem:
     def interval(self, times: Times) -> tuple[Times, Times]:
         """Return the ends of the 95 % intervals of time constant and delay [s], by the scatter of blocks of windows."""
         white, filters = self.left(times)
-        variance = np.mean(white**2, axis=0)
+        variance = _variance(white)
         places = [place for place in range(2) if times[place] > 0.0]
         steps = [0.1 * times[place] for place in places]
 
@@ -279,6 +285,11 @@ class _Problem:
         for place, one in zip(places, spread, strict=True):
             low[place], high[place] = max(0.0, times[place] - 1.96 * float(one)), times[place] + 1.96 * float(one)
         return (low[0], low[1]), (high[0], high[1])
+
+
+def _variance(white: Floats) -> Floats:
+    """Return the mean squares of what is left, shape (axes,), above zero."""
+    return np.asarray(np.maximum(np.mean(white**2, axis=0), np.finfo(np.float64).tiny))
 
 
 def _problem(

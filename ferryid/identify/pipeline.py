@@ -75,29 +75,25 @@ def fit_logs(
     """
     name, settings = check_name(name or profile.name), settings.on(profile)
     logs = usable_logs(paths, profile, settings, run)
+    responses = estimate_order_responses(logs.opened, profile, settings, run.progress)
+    said = tuple(map(str, responses))
     try:
         outcome = fit_opened(logs.opened, profile, settings, run, name)
     except FerryIdError as error:
-        if not logs.left_out:
+        if not logs.left_out and not said:
             raise
-        raise type(error)(logs.beside(error)) from error
-    return replace(outcome, warnings=(*outcome.warnings, *logs.left_out))
+        # What is followed late may be why.
+        late = type(error)(with_sentence(error, *said))
+        raise type(error)(logs.beside(late)) from error
+    return replace(outcome, warnings=(*said, *outcome.warnings, *logs.left_out), order_responses=responses)
 
 
 def fit_opened(
     opened: Sequence[Opened], profile: Profile, settings: FitSettings, run: RunContext, name: str
 ) -> FitOutcome:
     """Fit a correction of a profile's hull to logs that were read and aligned; arguments and errors as of `fit_logs`."""
-    run.progress("estimating how orders are followed")
-    responses = estimate_order_responses(opened, profile, settings)
-    try:
-        chosen = estimator_for(opened, profile, settings, run)
-        outcome = fit_and_judge(chosen.data, chosen.components, name, run)
-    except FerryIdError as error:
-        if not responses:
-            raise
-        # What is late may be why.
-        raise type(error)(with_sentence(error, *map(str, responses))) from error
+    chosen = estimator_for(opened, profile, settings, run)
+    outcome = fit_and_judge(chosen.data, chosen.components, name, run)
     model = _with_marks(outcome.model, opened)
     judged = model if outcome.judged is outcome.model else _with_marks(outcome.judged, opened)
     told = [f"The derivative's estimator was used: {chosen.why}."] if chosen.why else []
@@ -107,9 +103,8 @@ def fit_opened(
         outcome,
         model=model,
         judged=judged,
-        warnings=(*map(str, responses), *outcome.warnings, *chosen.notes, *told),
+        warnings=(*outcome.warnings, *chosen.notes, *told),
         estimators=chosen.scores,
-        order_responses=responses,
     )
 
 
