@@ -89,13 +89,6 @@ def signs_of(profile: Profile) -> tuple[list[str], int, list[tuple[str, str]]]:
     return angles, len(profile.actuators), pairs
 
 
-def orders_alone(profile: Profile) -> bool:
-    """Return whether the forces are those of orders, as no actuator has another signal: what follows them late is unseen."""
-    names = tuple(f"{one.name}." for one in profile.actuators)
-    acting = [one.quantity for one in profile.signals if one.quantity.startswith(names)]
-    return bool(acting) and all(one.endswith(".command") for one in acting)
-
-
 def wrong_size(
     response: Floats,
     spread: Floats,
@@ -139,7 +132,10 @@ def wrong_size(
         "correct the unit of the actuators' signals (1 rad/s is 9.55 rpm, 1 kgf 9.81 N), the thrust curve or mass_kg"
     )
     if orders and not small:
-        remedy += ", or map the actuators' feedback in place of their orders, if the log has it"
+        remedy += (
+            ", or map the actuators' feedback in place of their orders, if the log has it, or state how late these are "
+            "followed (time_constant_s, delay_s in their tables)"
+        )
     return f"{told}{cause}. Fix: in {profile}, {remedy}"
 
 

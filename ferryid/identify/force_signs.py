@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ferryid.errors import ReversedForcesError
-from ferryid.identify.contradictions import orders_alone, signs_of, unanswered, wrong_size, wrong_way
+from ferryid.identify.contradictions import signs_of, unanswered, wrong_size, wrong_way
 from ferryid.identify.inertia import relative_inertia, without_inertia
 from ferryid.identify.motion_data import LogData
 from ferryid.identify.split import Split
@@ -22,6 +22,7 @@ from ferryid.log_warnings import log_warnings
 from ferryid.models.forces import ACCELERATIONS
 from ferryid.regression import CrossProducts
 from ferryid.types import AXES, Flags, Floats, Ints
+from ferryid.vessel.order_response import orders_alone
 from ferryid.vessel.profile import Profile
 
 

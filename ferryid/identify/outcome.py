@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import per_cent
+from ferryid.effects.wording import listed
 from ferryid.identify.acceptance import Acceptance
 from ferryid.identify.log_condition import KindOutcome, LogCondition, conditions_json
 from ferryid.identify.thresholds import IDENTIFY
@@ -155,6 +157,56 @@ class EstimatorScore:
 
 
 @dataclass(frozen=True)
+class EstimatedResponse:
+    """How orders of one kind are followed, as logs show it.
+
+    Attributes
+    ----------
+    orders
+        Signals of the profile.
+    times, low, high
+        Time constant and delay [s], with the ends of their 95 % intervals; zero where there is none.
+    error
+        Squared error of the acceleration in windows over that of orders that are followed at once, mean of the axes.
+    """
+
+    orders: tuple[str, ...]
+    times: tuple[float, float]
+    low: tuple[float, float]
+    high: tuple[float, float]
+    error: float
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """The lines of a profile that state it, in the table of each of these orders."""
+        keys = ("time_constant_s", "delay_s")
+        return tuple(f"{key} = {value:.2g}" for key, value in zip(keys, self.times, strict=True) if value > 0.0)
+
+    def __str__(self) -> str:
+        names = listed([one.removesuffix(".command") for one in self.orders])
+        parts = [
+            f"a {what} of {value:.2g} s (95 % interval {low:.2g} to {high:.2g} s)"
+            for what, value, low, high in zip(("time constant", "delay"), self.times, self.low, self.high, strict=True)
+            if value > 0.0
+        ]
+        tables = listed([f'[signals."{one}"]' for one in self.orders])
+        return (
+            f"The orders of {names} are followed with {' and '.join(parts)}, estimated; the fit took them as followed at once. "
+            f"State it in the profile, in {tables}: {' and '.join(self.lines)} (accelerations then err by "
+            f"{per_cent(1.0 - self.error)} less, squared). A navigation that is as late looks alike."
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the response as plain values."""
+        ends = zip(("time_constant", "delay"), self.times, self.low, self.high, strict=True)
+        return {
+            "orders": list(self.orders),
+            **{key: {"value": value, "low": low, "high": high, "unit": "s"} for key, value, low, high in ends},
+            "squared_error": self.error,
+        }
+
+
+@dataclass(frozen=True)
 class LogWind:
     """Steady wind that acted in one log, estimated with the hull.
 
@@ -231,6 +283,8 @@ class FitOutcome:
         How well either estimator predicts, where a fit chose between them.
     notes
         What else there is to know of the logs, as sentences.
+    order_responses
+        How orders are followed that no feedback goes with, as the logs show it.
     """
 
     model: Model
@@ -249,6 +303,7 @@ class FitOutcome:
     conditions: tuple[LogCondition, ...] = ()
     condition_kinds: tuple[KindOutcome, ...] = ()
     notes: tuple[str, ...] = ()
+    order_responses: tuple[EstimatedResponse, ...] = ()
 
     @property
     def base_fits_already(self) -> float | None:

@@ -28,6 +28,7 @@ from ferryid.identify.judged_split import judged_split
 from ferryid.identify.log_sums import folds_by_blocks, force_free_axes, sum_log
 from ferryid.identify.model_selection import Selection, select_model, windows_to_try
 from ferryid.identify.motion_data import LogData, numbered_names, prepared_data
+from ferryid.identify.order_responses import estimate_order_responses
 from ferryid.identify.outcome import ComponentCurve, EstimatorScore, Excitation, FitOutcome
 from ferryid.identify.own_conditions import with_own_conditions
 from ferryid.identify.physical_checks import law_of, physical_checks
@@ -74,13 +75,19 @@ def fit_logs(
     """
     name, settings = check_name(name or profile.name), settings.on(profile)
     logs = usable_logs(paths, profile, settings, run)
+    responses = estimate_order_responses(logs.opened, profile, settings, run.progress)
+    said = tuple(map(str, responses))
     try:
         outcome = fit_opened(logs.opened, profile, settings, run, name)
     except FerryIdError as error:
-        if not logs.left_out:
+        if not logs.left_out and not said:
             raise
-        raise type(error)(logs.beside(error)) from error
-    return replace(outcome, warnings=(*outcome.warnings, *logs.left_out), notes=logs.notes)
+        # What is followed late may be why.
+        late = type(error)(with_sentence(error, *said))
+        raise type(error)(logs.beside(late)) from error
+    return replace(
+        outcome, warnings=(*said, *outcome.warnings, *logs.left_out), order_responses=responses, notes=logs.notes
+    )
 
 
 def fit_opened(

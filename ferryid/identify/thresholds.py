@@ -188,6 +188,36 @@ class IdentifyThresholds:
         "length of the windows in which the way is judged that forces act",
         "tuned on real recordings: small vessels turn to and fro within the usual one, and longer trials show it with either",
     )
+    quickest_response: float = threshold(
+        0.02,
+        "of the usual window",
+        "shortest time constant or delay of orders that is tried",
+        "convention: a fiftieth; less averages out",
+    )
+    slowest_response: float = threshold(
+        0.75,
+        "of the usual window",
+        "longest time constant or delay of orders that is tried, and none that ends there is reported",
+        "convention: a longer one cannot be distinguished from damping within a window",
+    )
+    responses_tried: int = threshold(
+        11,
+        "-",
+        "time constants and delays that are tried before the best is refined",
+        "convention: each 1.44 times the last",
+    )
+    response_whitening: int = threshold(
+        4,
+        "steps",
+        "of the estimate of how the errors of neighbouring windows are correlated",
+        "derived: it hardly changes",
+    )
+    windows_per_coefficient: int = threshold(
+        3,
+        "windows",
+        "fewest for each coefficient, for which it is estimated how orders are followed",
+        "convention: fewer leave more to chance than to the data",
+    )
     pose_agreement: float = threshold(
         0.5,
         "-",

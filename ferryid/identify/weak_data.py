@@ -16,7 +16,7 @@ from ferryid.effects.hull_spread import default_hull_spread
 from ferryid.errors import FerryIdError
 from ferryid.identify.condition_estimation import OwnConditions, estimate_own
 from ferryid.identify.condition_problem import hull_and_conditions
-from ferryid.identify.contradictions import orders_alone, response_of, signs_of, wrong_size, wrong_way
+from ferryid.identify.contradictions import response_of, signs_of, wrong_size, wrong_way
 from ferryid.identify.feasible import Feasible, LiftTie, feasible_gains
 from ferryid.identify.fit_data import Estimate
 from ferryid.identify.inertia import relative_inertia, without_inertia
@@ -36,6 +36,7 @@ from ferryid.regression import STRIDES, CrossProducts, QrFactor, Rows, Simpls, f
 from ferryid.regression.cross_validation import Folds
 from ferryid.regression.resampling import Blocks, block_seconds
 from ferryid.types import Flags, Floats, Ints
+from ferryid.vessel.order_response import orders_alone
 
 
 @dataclass(frozen=True, eq=False)
@@ -315,7 +316,9 @@ class WeakData(LogData):
         """Return the spread of the logs' own steady forces over the residual's, by expectation and maximisation."""
         noise = (1.0 + autocorrelation) / (1.0 - autocorrelation)
         variance = 0.1
-        some = [(one, _steady(windows)) for one, windows in zip(left, self.training_windows, strict=True) if len(one)]
+        some = [
+            (one, steady_forces(windows)) for one, windows in zip(left, self.training_windows, strict=True) if len(one)
+        ]
         for _ in range(IDENTIFY.expectation_steps):
             sizes = []
             for one, Z in some:
@@ -336,7 +339,7 @@ class WeakData(LogData):
             rows = self._rows_of(one, self.whitening.posed)
             table = np.column_stack([rows.chunk(0, len(one))[0], rows.Y, np.ones(len(one))])
             table = _decorrelate(
-                table, _steady(one) * self.whitening.condition, one.run, self.whitening.autocorrelation
+                table, steady_forces(one) * self.whitening.condition, one.run, self.whitening.autocorrelation
             )
             parts.append(table[:, :-1])
             ones.append(table[:, -1])
@@ -630,7 +633,7 @@ def every_second(rows: Flags, rate_hz: float) -> Ints:
     return np.flatnonzero(rows)[:: max(1, round(rate_hz))]
 
 
-def _steady(windows: WeakRows) -> Floats:
+def steady_forces(windows: WeakRows) -> Floats:
     """Return the ways in which a steady force of a log's own acts: along the hull, and along north and east, shape (J, 3)."""
     return np.column_stack([np.ones(len(windows)), windows.heading])
 

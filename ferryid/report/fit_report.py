@@ -175,6 +175,7 @@ def as_json(result: FitOutcome, stored: StoredModel, report: Path | None) -> dic
         **({"estimators": [one.to_json() for one in result.estimators]} if result.estimators else {}),
         **({"conditions": conditions} if (conditions := result.conditions_by_log()) else {}),
         **({"condition_kinds": [one.to_json() for one in result.condition_kinds]} if result.condition_kinds else {}),
+        **({"order_responses": [one.to_json() for one in result.order_responses]} if result.order_responses else {}),
         "report": None if report is None else str(report),
     }
 

@@ -20,7 +20,7 @@ from ferryid.signals.source import Held, Source
 from ferryid.signals.thresholds import SIGNALS
 from ferryid.signals.track import LeftOut, Track
 from ferryid.types import Flags, Floats
-from ferryid.vessel import actuator_columns, resolve, resolve_notes, slopes_of_pose
+from ferryid.vessel import actuator_columns, follow_orders, resolve, resolve_notes, slopes_of_pose
 from ferryid.vessel.profile import Profile
 
 if TYPE_CHECKING:
@@ -106,6 +106,7 @@ def align(recording: Recording, profile: Profile, rate_hz: float | None = None, 
         if message := single_rows(recording):
             raise FerryIdError(message) from error
         raise
+    columns = follow_orders(profile, columns, rate)
     measured = _measured(recording.name, profile, columns, wrong)
     valid = measured & ~wrong
     if not valid.any():

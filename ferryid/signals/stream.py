@@ -88,8 +88,8 @@ class Recording:
             actuator, _, role = quantity.partition(".")
             if role in ROLE_PREFIX and f"{ROLE_PREFIX[role]}_cmd_{actuator}" in self.found:
                 sentences.append(
-                    f"{quantity}: the order is used, as the feedback is not in the log ({reason.rstrip('.')}); the actuator's "
-                    "lag stays in the residual."
+                    f"{quantity}: the order is used, as the feedback is not in the log ({reason.rstrip('.')}); it is taken "
+                    "as followed at once where the profile states no time constant."
                 )
         return tuple(sentences)
 

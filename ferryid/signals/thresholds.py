@@ -595,6 +595,12 @@ class SignalThresholds:
         "range of the heading above which a vessel drifts in its turns",
         "convention: six degrees; on a straight course nothing need drift",
     )
+    feedback_doublings: int = threshold(
+        4,
+        "doublings",
+        "of the first step's past, over which forces are searched for an answer to errors of the motion",
+        "derived: sixteen of the twenty steps of a window, the time over which errors are judged",
+    )
 
 
 SIGNALS = SignalThresholds()

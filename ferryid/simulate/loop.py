@@ -14,7 +14,7 @@ from ferryid.simulate.control.reference import Tuning, advance_reference, body_r
 from ferryid.simulate.noise import NavErrors, measure
 from ferryid.simulate.plant.hull import State
 from ferryid.simulate.plant.motion import Plant, advance
-from ferryid.types import Flags, Floats
+from ferryid.types import Flags, Floats, Ints
 
 OBSERVED = 9
 ROW = 7 + OBSERVED
@@ -134,6 +134,7 @@ def run(loop: Loop, memory: Memory, measured: Measured, h: float, steps: int, ro
             index = 2 * (first + j)
             for i in range(k):
                 row[ROW + i], row[ROW + k + i] = memory.thrusters[i, 0], memory.thrusters[i, 1]
+            _delay(plant.gear.delay, records, first + j, steps, acting)
             state = advance(plant, index, h, state, memory.thrusters, acting, row[7:ROW])
             _copy(orders, acting)
 
@@ -143,6 +144,20 @@ def _copy(orders: Floats, into: Floats) -> None:
     # An assignment of slices would bring in, and compile, all that makes the text of its errors.
     for i in range(len(orders)):
         into[i, 0], into[i, 1] = orders[i, 0], orders[i, 1]
+
+
+@compiled
+def _delay(delay: Ints, records: Floats, step: int, steps: int, acting: Floats) -> None:
+    """Put earlier orders in the place of those that act in a step, where actuators follow them later than one step.
+
+    `delay` is in steps, shape (k, 2); `steps` of them are a cycle, whose orders stand in its row of `records`.
+    """
+    k = len(acting)
+    for i in range(k):
+        for j in range(2):
+            if delay[i, j] > 0:
+                given = step - 1 - delay[i, j]
+                acting[i, j] = records[given // steps, RECORD + j * k + i] if given >= 0 else 0.0
 
 
 @compiled

@@ -4,6 +4,7 @@ from ferryid.vessel.choice import VesselChoice, choose_vessel, stated_choice
 from ferryid.vessel.describe import describe
 from ferryid.vessel.faults import Fault
 from ferryid.vessel.load import bundled, check_profile, given_as, known, load_profile, parse_profile
+from ferryid.vessel.order_response import follow_orders
 from ferryid.vessel.resolve import SWAY_NOT_MEASURED, resolve, resolve_notes, slopes_of_pose
 from ferryid.vessel.signal_map import Selection, convert, select, survey
 from ferryid.vessel.thrusters import actuator_columns, applied_force, speed_doubts
@@ -20,6 +21,7 @@ __all__ = [
     "choose_vessel",
     "convert",
     "describe",
+    "follow_orders",
     "given_as",
     "known",
     "load_profile",

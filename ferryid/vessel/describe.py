@@ -6,6 +6,7 @@ import math
 
 from ferryid.vessel.profile import Actuator, Profile, Signal
 from ferryid.vessel.signal_map import canonical_columns, stream_name
+from ferryid.vessel.thrusters import response_words
 
 
 def describe(profile: Profile) -> str:
@@ -142,6 +143,8 @@ def _how(signal: Signal) -> str:
         parts.append(f"standing at x = {signal.mount_m[0]:g} m")
     elif signal.mount_m != (0.0, 0.0):
         parts.append(f"measured at ({signal.mount_m[0]:g}, {signal.mount_m[1]:g}) m")
+    if told := response_words(signal):
+        parts.append(f"followed {told}")
     if not signal.required:
         parts.append("may be missing")
     return ", ".join(part for part in parts if part)

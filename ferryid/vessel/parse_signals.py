@@ -23,6 +23,8 @@ SHARES = ("%", "fraction", "us")
 """Units of a signal that is a share of full power or of full travel."""
 SCALED, MOST_SCALE = ("velocity", "yaw_rate"), 100.0
 """Quantities whose instruments may read too much or too little by a share, and the largest factor on them."""
+LONGEST_RESPONSE_S = 60.0
+"""Longest time constant and delay with which an actuator may follow its order [s]: what is slower is no actuator."""
 _OPTIONAL = ("wind", "current", "payload", "tau_d", "position_d", "heading_d", "roll", "pitch")
 
 
@@ -212,6 +214,7 @@ def _actuator_signal(quantity: str, table: TableReader, actuators: dict[str, Act
     if element is not None:
         fields = tuple(path if "[]" in path else f"{path}[]" for path in fields)
     required = table.flag("required", not quantity.endswith(".command"))
+    time_constant_s, delay_s = (_response(table, quantity, key) for key in ("time_constant_s", "delay_s"))
     table.has("shared")
     where = parse_where(table)
     table.close()
@@ -228,7 +231,23 @@ def _actuator_signal(quantity: str, table: TableReader, actuators: dict[str, Act
         where=where,
         pulse_us=pulse_us,
         element=element,
+        time_constant_s=time_constant_s,
+        delay_s=delay_s,
     )
+
+
+def _response(table: TableReader, quantity: str, key: str) -> float:
+    """Take a time with which an actuator follows its order [s]; NaN where it is not stated."""
+    if not table.has(key):
+        return math.nan
+    if not quantity.endswith(".command"):
+        table.fault(
+            f'"{key}" is of an order, and {quantity} is what was measured. '
+            f'Fix: remove it, or write [signals."{quantity}.command"] where the signal is the order',
+            key,
+        )
+        return math.nan
+    return table.number(key, math.nan, at_least=0.0, at_most=LONGEST_RESPONSE_S)
 
 
 def _full(table: TableReader, role: str) -> float:

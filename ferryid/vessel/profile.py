@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import inf, nan
+from math import inf, isfinite, nan
 
 from ferryid.ingest.log import TableLayout
 from ferryid.types import Floats
@@ -126,6 +126,7 @@ class Signal:
     neutral and full ahead, and the dead band [us]. `mount_m` is where an antenna or a log sits, or a payload whose place is
     not measured (x forward, y starboard of the body origin) [m]. On a topic of several signals `where` chooses its messages:
     fields and their values. In an array whose entries have names, `element` is the array of names and the signal's own.
+    The actuator follows an order by a first-order lag of `time_constant_s`, `delay_s` late; NaN where that is not stated.
     """
 
     quantity: str
@@ -144,6 +145,18 @@ class Signal:
     pulse_us: tuple[float, float, float, float] | None = None
     scale: float = 1.0
     element: Element | None = None
+    time_constant_s: float = nan
+    delay_s: float = nan
+
+    @property
+    def is_order(self) -> bool:
+        """Whether it is what an actuator was ordered, rather than what was measured."""
+        return self.quantity.endswith(".command")
+
+    @property
+    def states_response(self) -> bool:
+        """Whether the profile states how the actuator follows this order."""
+        return isfinite(self.time_constant_s) or isfinite(self.delay_s)
 
 
 SETTINGS = ("tank", "pond", "harbour", "sea")

@@ -102,7 +102,7 @@ def survey(profile: Profile, topics: Sequence[Topic], losses: Sequence[Loss] = (
         shown = _in_column_order(signal) if len(columns) == len(signal.fields) else (", ".join(signal.fields),)
         chosen = "" if signal.element is None else f" of {signal.element[1]}"
         found.update({column: f"{topic.name}: {path}{chosen}" for column, path in zip(columns, shown, strict=True)})
-    notes = tuple(order_note(name, role) for name, role in _orders_instead(profile, missing))
+    notes = tuple(order_note(profile, name, role) for name, role in _orders_instead(profile, missing))
     return Selection({name: tuple(paths) for name, paths in wanted.items()}, found, missing, notes)
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ferryid.counts import counted, per_cent
 from ferryid.errors import FerryIdError
 from ferryid.types import Floats
-from ferryid.vessel.profile import Actuator, Profile, ThrustCurve
+from ferryid.vessel.profile import Actuator, Profile, Signal, ThrustCurve
 from ferryid.vessel.rudder import inflow_speed, rudder_force
 
 FRESH_WATER = 1000.0
@@ -99,9 +99,22 @@ def needed_roles(actuator: Actuator) -> tuple[tuple[str, ...], ...]:
     return (strength, *turn)
 
 
-def order_note(name: str, role: str) -> str:
-    """Say that an order stands in for the feedback of an actuator."""
-    return f"The {role} of {name} is the order, as there is no feedback: its lag stays in the residual."
+def order_note(profile: Profile, name: str, role: str) -> str:
+    """Say that an order stands in for the feedback of an actuator, and how it is followed."""
+    order = next((one for one in profile.signals if one.quantity == f"{name}.{role}.command"), None)
+    stated = response_words(order) if order is not None else ""
+    how = f", followed {stated}, as the profile states" if stated else ": its lag stays in the residual"
+    return f"The {role} of {name} is the order, as there is no feedback{how}."
+
+
+def response_words(signal: Signal) -> str:
+    """Return how the profile states that an order is followed, to stand after "followed"; empty where it states nothing."""
+    parts = [
+        f"a {what} of {value:g} s"
+        for what, value in (("time constant", signal.time_constant_s), ("delay", signal.delay_s))
+        if math.isfinite(value) and value > 0.0
+    ]
+    return f"with {' and '.join(parts)}" if parts else "at once" * signal.states_response
 
 
 def actuator_columns(
@@ -150,7 +163,7 @@ def actuator_columns(
             role, column, order = candidates[0]
             chosen[actuator.name, role] = column
             if order and measured:
-                notes.append(order_note(actuator.name, role))
+                notes.append(order_note(profile, actuator.name, role))
     return chosen, tuple(notes)
 
 

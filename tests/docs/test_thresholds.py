@@ -76,7 +76,7 @@ NO_DECISION = {
         diagnose.second_sources.comparison _SAME
         diagnose.second_sources.samples _ROUNDING
         diagnose.inference.campaign SAME
-        diagnose.inference.feedback SAME
+        signals.feedback SAME
         diagnose.judging.responses ROUNDING
         diagnose.inference.coloured_noise LEAST_VARIANCE
         identify.acceptance _ROUNDING _NOTHING

@@ -18,7 +18,7 @@ from ferryid.errors import FerryIdError
 from ferryid.identify import estimators, inputs
 from ferryid.identify import feasible as feasible_module
 from ferryid.identify import physical_checks as physical_checks_module
-from ferryid.identify.contradictions import orders_alone, wrong_size, wrong_way
+from ferryid.identify.contradictions import wrong_size, wrong_way
 from ferryid.identify.estimation import estimate_correction
 from ferryid.identify.feasible import Feasible, _nearest, feasible_gains
 from ferryid.identify.inertia import relative_inertia
@@ -39,6 +39,7 @@ from ferryid.signals.smooth import smooth_measured
 from ferryid.signals.track import Motion
 from ferryid.types import RunContext, no_progress
 from ferryid.vessel import load_profile
+from ferryid.vessel.order_response import orders_alone
 from ferryid.vessel.profile import Profile
 from tests.identify.rounds import PROFILE, RATE_HZ, motion
 from tests.identify.trials import measured

@@ -164,6 +164,28 @@ def test_an_order_holds_until_the_next_one() -> None:
     np.testing.assert_array_equal(track.columns["n_cmd_thruster1"], expected)
 
 
+def test_an_order_without_feedback_is_followed_as_the_profile_states_and_not_through_a_gap() -> None:
+    """Rows on which what was ordered before is not known, for a delay of 0.5 s after a gap, are left out and counted."""
+    signals = [
+        replace(one, time_constant_s=0.4, delay_s=0.5) if one.quantity == "thruster1.speed.command" else one
+        for one in PROFILE.signals
+        if one.quantity != "thruster1.speed"
+    ]
+    late = replace(PROFILE, signals=tuple(signals))
+    t = np.arange(0, 40, 0.1)
+    kept = t[(t < 15.0) | (t > 20.0)]
+    orders = stream("/orders", kept, {"n_cmd_thruster1": 10.0 * kept})
+    track = align(recording(navigation(t), thrusters(t, n_thruster1=0.0 * t), orders), late, 10.0)
+    now, state = absolute(track), track.columns["n_cmd_thruster1"]
+    settled = (now > 5.0) & (now < 15.0 - 1e-6)
+    np.testing.assert_allclose(state[settled], 10.0 * (now[settled] - 0.9), atol=0.01)
+    lost = np.flatnonzero(~track.valid)
+    assert now[lost[-1]] == pytest.approx(20.0 + 0.5, abs=0.11), "the delay after the gap"
+    assert any(f"{lost.size} of" in said and f"n_cmd_thruster1 {lost.size}" in said for said in track.repairs)
+    # It stands where the first order after the gap has it, and nowhere on the way from the last one before.
+    assert state[lost[-1] + 1] == pytest.approx(10.0 * 20.1, abs=1.1)
+
+
 def test_actuators_published_on_change_hold_across_any_time_and_it_is_said() -> None:
     t = np.arange(0, 60, 0.1)
     times = np.array([0.0, 0.1, 0.2, 7.0, 7.1, 7.2, 20.0, 20.1, 20.2, 41.0, 41.1, 41.2])

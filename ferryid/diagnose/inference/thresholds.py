@@ -233,12 +233,6 @@ class InferenceThresholds:
         "Kuiper's statistic of changes of a mean above which there is one",
         "derived: one change in a thousand by chance; of whole series of noise, three in a hundred have one",
     )
-    feedback_doublings: int = threshold(
-        4,
-        "doublings",
-        "of the first step's past, over which forces are searched for an answer to errors of the motion",
-        "derived: sixteen of the twenty steps of a window, the time over which errors are judged",
-    )
     active_share: float = threshold(
         0.25,
         "of the largest excess",

@@ -15,7 +15,7 @@ from ferryid.diagnose.inference.campaign_estimation import CampaignFit
 from ferryid.diagnose.inference.campaign_model import Campaign
 from ferryid.diagnose.inference.campaign_properties import Rivals, TriedProperty, select_properties, without_property
 from ferryid.diagnose.inference.estimation import Candidate
-from ferryid.diagnose.inference.feedback import Feedback, feedback_beside, joined
+from ferryid.diagnose.inference.feedback import feedback_beside, joined
 from ferryid.diagnose.inference.force_errors import mass_of
 from ferryid.diagnose.inference.group_differences import compare_estimated, scatter_shows
 from ferryid.diagnose.inference.thresholds import INFERENCE
@@ -37,6 +37,7 @@ from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.effect import HELD
 from ferryid.effects.wording import weak_evidence
 from ferryid.side_by_side import over
+from ferryid.signals.feedback import Feedback
 from ferryid.types import AXES, Floats
 from ferryid.vessel.circumstances import Circumstances
 

@@ -40,10 +40,13 @@ from ferryid.diagnose.judging.likeness import likeness_of_logs
 from ferryid.diagnose.judging.locate import locate, locate_between
 from ferryid.diagnose.judging.posterior import Posterior, posterior_of
 from ferryid.diagnose.judging.verdict import Remainder, verdict_of
+from ferryid.effects.wording import listed
 from ferryid.signals.time_ranges import ranges_of
 from ferryid.types import AXES, Floats
 from ferryid.vessel import given_as
 from ferryid.vessel.circumstances import Circumstances
+from ferryid.vessel.order_response import orders_alone
+from ferryid.vessel.profile import Profile
 
 TEN_MINUTES = {
     "": "Record at least ten minutes that excite every axis.",
@@ -285,6 +288,24 @@ def remedies(log: ScreenedLog, findings: Sequence[Finding]) -> tuple[str, ...]:
         line = known[one.effect].in_profile(log.measurements.profile, values) if one.effect in sure & set(known) else ""
         if line:
             notes.append(f"{one.says.rstrip('.')}. In the profile, {line} corrects that for every command.")
+    return (*notes, *order_remedies(log.measurements.profile, findings))
+
+
+def order_remedies(profile: Profile, findings: Sequence[Finding]) -> tuple[str, ...]:
+    """Return which lines of a profile state what sure findings say of orders that no feedback goes with."""
+    if not orders_alone(profile) or any(one.states_response for one in profile.signals):
+        return ()
+    tables = listed([f'[signals."{one.quantity}"]' for one in profile.signals if one.is_order])
+    notes = []
+    for one in findings:
+        key, name = {"thruster_lag": ("time_constant_s", "time_constant"), "time_delay": ("delay_s", "seconds")}.get(
+            one.effect, ("", "")
+        )
+        if key and one.sure and one.parameters[name].value > 0.0:
+            notes.append(
+                "The actuators are known by their orders alone, which they may follow late; a late navigation looks alike. In "
+                f"the profile, {key} = {one.parameters[name].value:.2g} in {tables} states it for every command."
+            )
     return tuple(notes)
 
 

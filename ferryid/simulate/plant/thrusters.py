@@ -19,11 +19,15 @@ from ferryid.simulate.plant.rudder import COLUMNS, rudder_load, rudder_row
 from ferryid.simulate.plant.thrust import Curves, curves_of, force_at, largest_force
 from ferryid.simulate.sections import Thrusters
 from ferryid.types import Floats, Ints
+from ferryid.vessel.order_response import OrderResponse
 from ferryid.vessel.profile import Profile
 from ferryid.vessel.thrusters import FRESH_WATER
 
 FIXED, AZIMUTH, RUDDER = 0, 1, 2
 """What an actuator's second order turns: nothing, itself, or its rudder."""
+
+UNLIMITED = 1e12
+"""A limit of the rate that nothing reaches, in any unit."""
 
 FORCE, COS, SIN, RPS, HELM, FACTOR, DEFICIT, KEEP = range(8)
 """Columns of `Gear.acting`: bollard force with losses [N], its direction, propeller speed [1/s], rudder angle [rad], the
@@ -35,7 +39,8 @@ class Gear(NamedTuple):
 
     `unit` is the share of one propeller, before thrust deduction, in the force on the hull. `advance` and `k_t` (k, m) are
     the open-water tables, `points` their lengths (0 for other curves), `open_water` (k, 2) ``rho D^4`` of all units after
-    deduction and K_T astern. `acting` (3, k, 8) is written anew in every step, for its start, middle and end. `added` changes
+    deduction and K_T astern. `delay` (k, 2) is by how many steps speed and angle follow their orders late. `acting`
+    (3, k, 8) is written anew in every step, for its start, middle and end. `added` changes
     what the curves give.
     """
 
@@ -50,6 +55,7 @@ class Gear(NamedTuple):
     angle_lag: Floats
     angle_rate: Floats
     angle_decay: Floats
+    delay: Ints
     force_lag: Floats
     half: Weights
     whole: Weights
@@ -94,11 +100,12 @@ def gear_of(profile: Profile, dynamics: Thrusters, h: float, added: Added | None
         angle=np.array([float(a.angle_rad) for a in actuators]),
         speed_lag=np.full(k, dynamics.speed_lag_s),
         # The rate limit is one of propeller speed; a force given directly has none.
-        speed_rate=np.where(curves.direct > 0, 1e12, dynamics.speed_rate_rpmps),
+        speed_rate=np.where(curves.direct > 0, UNLIMITED, dynamics.speed_rate_rpmps),
         speed_decay=np.full(k, decay_of(dynamics.speed_lag_s, 0.5 * h)),
         angle_lag=np.zeros(k),
         angle_rate=np.zeros(k),
         angle_decay=np.zeros(k),
+        delay=np.zeros((k, 2), dtype=np.int64),
         force_lag=np.full(k, dynamics.force_lag_s),
         half=lag_weights(dynamics.force_lag_s, h, 0.5),
         whole=lag_weights(dynamics.force_lag_s, h, 1.0),
@@ -122,6 +129,7 @@ def gear_of(profile: Profile, dynamics: Thrusters, h: float, added: Added | None
         lag, rate = turning[int(gear.steers[i])]
         gear.angle_lag[i], gear.angle_rate[i] = lag, rate * pi / 180.0
         gear.angle_decay[i] = decay_of(lag, 0.5 * h)
+        _follow_as_stated(gear, profile, i, h)
         if actuator.rudder:
             gear.rudder[i] = rudder_row(actuator)
         curve = actuator.thrust
@@ -132,6 +140,24 @@ def gear_of(profile: Profile, dynamics: Thrusters, h: float, added: Added | None
             density = actuator.inflow.get("water_density", FRESH_WATER)
             gear.open_water[i] = actuator.count * deduction * density * D * D * D * D, curve.astern
     return gear
+
+
+def _follow_as_stated(gear: Gear, profile: Profile, i: int, h: float) -> None:
+    """Let an actuator follow its orders as the profile states, in the place of the scenario's lags and rate limits."""
+    for signal in profile.signals:
+        name, _, role = signal.quantity.partition(".")
+        if name != profile.actuators[i].name or not signal.states_response:
+            continue
+        response = OrderResponse.of(signal)
+        turns = role in ("angle.command", "rudder.command")
+        lag, rate, decay = (
+            (gear.angle_lag, gear.angle_rate, gear.angle_decay)
+            if turns
+            else (gear.speed_lag, gear.speed_rate, gear.speed_decay)
+        )
+        lag[i], rate[i] = response.time_constant_s, UNLIMITED
+        decay[i] = decay_of(response.time_constant_s, 0.5 * h)
+        gear.delay[i, int(turns)] = round(response.delay_s / h)
 
 
 @borrowing

@@ -24,7 +24,6 @@ from ferryid.diagnose.inference.campaign_properties import (
     with_property,
 )
 from ferryid.diagnose.inference.estimation import Candidate
-from ferryid.diagnose.inference.feedback import Feedback
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging import campaign as judging
@@ -35,6 +34,7 @@ from ferryid.effects.actuator_force import force_limits
 from ferryid.effects.effect import HELD
 from ferryid.effects.ventilation import drawn
 from ferryid.recursive_filter import lagged
+from ferryid.signals.feedback import Feedback
 from ferryid.types import Floats, no_progress
 from tests.diagnose.inference.test_campaign_estimation import CALM, FERRY, campaign
 

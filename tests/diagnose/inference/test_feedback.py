@@ -9,15 +9,9 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.inference.estimation import fit, fitted_force_model
-from ferryid.diagnose.inference.feedback import (
-    LAGS,
-    Feedback,
-    directed_information,
-    feedback_beside,
-    feedback_of,
-    joined,
-)
+from ferryid.diagnose.inference.feedback import feedback_beside, feedback_of, joined
 from ferryid.diagnose.inference.weak_form import Windows
+from ferryid.signals.feedback import LAGS, Feedback, directed_information
 from ferryid.types import Floats
 from tests.diagnose.judging.test_held_out import sailed, trial_on
 

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.inference.estimation import EstimationProblem, fit
-from ferryid.diagnose.inference.feedback import Feedback
 from ferryid.diagnose.judging import findings
 from ferryid.diagnose.judging.backward_elimination import Elimination
 from ferryid.diagnose.judging.claims import LogFigures
@@ -21,6 +20,7 @@ from ferryid.diagnose.judging.posterior import posterior_of
 from ferryid.diagnose.judging.rivals import RivalComparison
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
+from ferryid.signals.feedback import Feedback
 from ferryid.types import AXES
 from tests.diagnose.judging.test_campaign_posterior import survey
 from tests.diagnose.judging.test_held_out import FERRY, WIND, candidate, sailed, trial_on

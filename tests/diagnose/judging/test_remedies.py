@@ -12,11 +12,12 @@ import pytest
 from ferryid.diagnose.checks import SensorFinding
 from ferryid.diagnose.checks.screening import ScreenedLog
 from ferryid.diagnose.data.estimate import Estimate
-from ferryid.diagnose.judging.conclude import remedies
+from ferryid.diagnose.judging.conclude import order_remedies, remedies
 from ferryid.diagnose.judging.judge import sensor_claims
 from ferryid.effects.force_model import Measurements
-from ferryid.vessel import load_profile
+from ferryid.vessel import load_profile, parse_profile
 from tests.diagnose.judging.findings import found
+from tests.simulate.order_boat import profile_text
 
 PROFILE = load_profile("milliampere")
 
@@ -38,6 +39,23 @@ def test_the_line_of_the_profile_follows_a_sure_error() -> None:
     assert remedies(screened("yaw_rate_scale"), [sure]) == (says,)
     assert remedies(screened("yaw_rate_scale"), [replace(sure, probability=0.4)]) == ()
     assert remedies(screened("yaw_rate_scale"), []) == ()
+
+
+@pytest.mark.parametrize(
+    ("effect", "name", "line"),
+    [("thruster_lag", "time_constant", "time_constant_s = 0.61"), ("time_delay", "seconds", "delay_s = 0.61")],
+)
+def test_orders_that_are_followed_late_are_stated_in_the_profile(effect: str, name: str, line: str) -> None:
+    profile = parse_profile(profile_text(), "boat.toml")
+    late = replace(found(effect), parameters={name: Estimate(0.614, 0.5, 0.7, "s")})
+    (said,) = order_remedies(profile, [late])
+    assert f'{line} in [signals."left.speed.command"] and [signals."right.speed.command"] states it' in said
+    assert order_remedies(profile, [replace(late, probability=0.4)]) == ()
+    early = replace(late, parameters={name: Estimate(-0.614, -0.7, -0.5, "s")})
+    assert order_remedies(profile, [early]) == ()
+    assert order_remedies(profile, [found("wind")]) == ()
+    for other in (profile_text(feedback=True), profile_text("time_constant_s = 0.3")):
+        assert order_remedies(parse_profile(other, "boat.toml"), [late]) == ()
 
 
 def test_what_the_signal_map_cannot_correct_has_no_line() -> None:
