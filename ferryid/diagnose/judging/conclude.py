@@ -40,7 +40,6 @@ from ferryid.diagnose.judging.likeness import likeness_of_logs
 from ferryid.diagnose.judging.locate import locate, locate_between
 from ferryid.diagnose.judging.posterior import Posterior, posterior_of
 from ferryid.diagnose.judging.verdict import Remainder, verdict_of
-from ferryid.effects.wording import listed
 from ferryid.signals.time_ranges import ranges_of
 from ferryid.types import AXES, Floats
 from ferryid.vessel import given_as
@@ -292,21 +291,20 @@ def remedies(log: ScreenedLog, findings: Sequence[Finding]) -> tuple[str, ...]:
 
 
 def order_remedies(profile: Profile, findings: Sequence[Finding]) -> tuple[str, ...]:
-    """Return which lines of a profile state what sure findings say of orders that no feedback goes with."""
+    """Return what a sure lag or delay means where no feedback goes with the orders, and the profile states nothing of them.
+
+    The number is left to the fit: what follows an order is a speed, and the lag of a diagnosis is one of the force.
+    """
     if not orders_alone(profile) or any(one.states_response for one in profile.signals):
         return ()
-    tables = listed([f'[signals."{one.quantity}"]' for one in profile.signals if one.is_order])
-    notes = []
-    for one in findings:
-        key, name = {"thruster_lag": ("time_constant_s", "time_constant"), "time_delay": ("delay_s", "seconds")}.get(
-            one.effect, ("", "")
-        )
-        if key and one.sure and one.parameters[name].value > 0.0:
-            notes.append(
-                "The actuators are known by their orders alone, which they may follow late; a late navigation looks alike. In "
-                f"the profile, {key} = {one.parameters[name].value:.2g} in {tables} states it for every command."
-            )
-    return tuple(notes)
+    late = {"thruster_lag": "time_constant", "time_delay": "seconds"}
+    if not any(one.sure and one.effect in late and one.parameters[late[one.effect]].value > 0.0 for one in findings):
+        return ()
+    return (
+        "The actuators are known by their orders alone, which they may follow late; a late navigation looks alike. ferryid fit "
+        "estimates time_constant_s and delay_s of these orders where a log shows them, and prints the lines of the profile "
+        "that state them for every command.",
+    )
 
 
 def origin_note(sha256: str) -> tuple[str, ...]:
