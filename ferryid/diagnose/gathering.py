@@ -278,9 +278,15 @@ def _parted(group: Group, profile: Profile, model: Model | None) -> list[Group]:
 
 
 def _why(split: Split) -> str:
-    return (
+    told = (
         f"held-out squared force error with one hull {split.ratio:.1f} times that with hulls of their own, likelihood of "
         f"held-out stretches {split.gain.total:+.0f} nat with these"
+    )
+    if not split.apart:
+        return told
+    return (
+        f"{told}; in what both sides show, the hulls differ by {100.0 * split.hulls.share:.0f} % of the larger one, in squares "
+        f"{split.hulls.scatter:.1f} times as far as a log from the others of its side"
     )
 
 
@@ -302,7 +308,7 @@ def _without_references(group: Group, paths: set[str], split: Split) -> Group:
 def _left_out(group: Group, path: str, split: Split, others: int) -> Group:
     note = (
         f"Left out of the campaign: {path}: no common hull fits it and the {counted(others, 'other log')} ({_why(split)}); "
-        "another vessel, or its hull or load changed. Fix: diagnose it with --each, or with the right profile"
+        "another vessel, or its hull or load changed. Fix: diagnose it with --each, or with the right profile, or leave it out"
     )
     kept = tuple(one for one in group.logs if one.path != path)
     return replace(group, logs=kept, notes=(*group.notes, note))
@@ -323,7 +329,7 @@ def _halves(group: Group, inside: set[str], outside: set[str], split: Split) -> 
     first, second = (_names(group, {one.path for one in logs}) for logs in parts)
     note = (
         f"No common hull fits {first} on one side and {second} on the other ({_why(split)}). The hull or the load changed "
-        "between them, or one side is of another vessel."
+        "between them, or one side is of another vessel. Fix: diagnose each side by itself, with its own profile"
     )
     return [
         replace(
