@@ -20,6 +20,7 @@ from ferryid.diagnose.judging.diagnosis import distinct
 from ferryid.effects.wording import listed
 from ferryid.errors import FerryIdError
 from ferryid.files import resolved
+from ferryid.identify.engagement import unanswered_force, unengaged
 from ferryid.models import Model
 from ferryid.side_by_side import over
 from ferryid.signals.artificial import NO_RECORDING
@@ -30,6 +31,8 @@ from ferryid.vessel.profile import Profile
 
 OWN_HULLS = "The campaign is split: each side has a hull of its own, and a model is stored of the latest one."
 STAY = "They stay together here: what changed between them is in neither group's differences, and widens what is not known."
+CAMPAIGN, REFERENCES = "campaign", "references"
+"""What logs are left out of."""
 SHOWN_OVERLAPS = 3
 """Pairs of overlapping logs that are listed; the others are counted."""
 
@@ -88,7 +91,9 @@ def gather(
     errors = {path: one for path, one in zip(paths, made, strict=True) if isinstance(one, FerryIdError)}
     if not found:
         raise next(iter(errors.values()))
-    whose = "references" if references else "campaign"
+    errors |= _unengaged(found, profile)
+    found = [one for one in found if one.path not in errors]
+    whose = REFERENCES if references else CAMPAIGN
     notes = [*left_out_of(whose, errors)]
     notes += [
         f"Given twice: {path}: it counts once"
@@ -101,6 +106,51 @@ def gather(
     kept = [one for one in kept if one.path not in again]
     why += [_copied(path, other, whose) for path, other in copies]
     return Gathered(tuple(kept), (*notes, *why, *_clocks(kept)), copies)
+
+
+def _unengaged(logs: Sequence[AveragedLog], profile: Profile) -> dict[str, FerryIdError]:
+    """Return the errors of logs in which the actuators were not engaged, where others show that the vessel follows them."""
+    responses = {one.path: one.screened.measured.response for one in logs}
+    return {path: FerryIdError(f"{path}: {why}") for path, why in unengaged(responses, profile).items()}
+
+
+def _unanswered(logs: Sequence[AveragedLog], profile: Profile) -> tuple[str, ...]:
+    """Return a sentence on logs that are used though the vessel hardly follows the applied force in them."""
+    told = {one.path: unanswered_force(one.screened.measured.response, profile) for one in logs}
+    several = [(path, why) for path, why in told.items() if why]
+    if not several:
+        return ()
+    (path, why), more = several[0], len(several) - 1
+    what, _, remedy = why.partition(". Fix: ")
+    also = f" So it is in {counted(more, 'more log')}." if more else ""
+    return (
+        f"{path}: {what}. What is found of forces in such a log means little.{also} Fix: see whether the actuators were "
+        f"engaged, or {remedy}",
+    )
+
+
+def engaged(groups: Sequence[tuple[str, Gathered]], profile: Profile) -> tuple[Gathered, ...]:
+    """Return groups of logs of one vessel without those in which the actuators were not engaged, as logs of any group show.
+
+    A group of which none would be left keeps its logs, but for references. A sentence is on each log that is left out, and on
+    those that stay though the vessel hardly follows the applied force in them.
+
+    Parameters
+    ----------
+    groups
+        What each is called that logs are left out of, such as ``"campaign"``, and its logs.
+    profile
+        The vessel.
+    """
+    errors, found = _unengaged([one for _, group in groups for one in group.logs], profile), list[Gathered]()
+    for whose, group in groups:
+        here = {one.path: errors[one.path] for one in group.logs if one.path in errors}
+        kept = tuple(one for one in group.logs if one.path not in here)
+        # References are no more than help; what is diagnosed or compared is not empty.
+        without = bool(kept) or whose == REFERENCES
+        left_out, logs = (left_out_of(whose, here), kept) if without else ((), group.logs)
+        found.append(replace(group, logs=logs, notes=(*group.notes, *left_out, *_unanswered(logs, profile))))
+    return tuple(found)
 
 
 def _resolved(path: str) -> tuple[str, ...]:

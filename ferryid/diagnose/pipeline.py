@@ -8,8 +8,11 @@ from functools import partial
 from pathlib import PurePath
 
 from ferryid.diagnose.gathering import (
+    CAMPAIGN,
+    REFERENCES,
     Gathered,
     Group,
+    engaged,
     gather,
     part,
     with_common_sensors,
@@ -138,10 +141,11 @@ def _groups(
 ) -> tuple[Group, ...]:
     """Return the logs that can be used, in groups of one hull each."""
     gathered = gather(logs, profile, run, withhold=settings.withhold)
-    if settings.against is not None:
-        return (Group(gathered.logs, notes=gathered.notes, copies=gathered.copies),)
     if references.logs:
         references = without_logs(references, gathered.logs)
+    gathered, references = engaged(((CAMPAIGN, gathered), (REFERENCES, references)), profile)
+    if settings.against is not None:
+        return (Group(gathered.logs, notes=gathered.notes, copies=gathered.copies),)
     run.progress("comparing the sensors of the logs")
     screened = with_common_sensors([*gathered.logs, *references.logs])
     gathered, references = (

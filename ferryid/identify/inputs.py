@@ -8,7 +8,8 @@ from pathlib import Path
 
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError, with_sentence
-from ferryid.identify.force_signs import ForceResponse, force_response, unengaged
+from ferryid.identify.engagement import unengaged
+from ferryid.identify.force_signs import ForceResponse, force_response
 from ferryid.identify.motion_data import prepared_data
 from ferryid.identify.settings import FitSettings
 from ferryid.signals.consistency import comparable
