@@ -4,7 +4,15 @@ from ferryid.diagnose.data.course import Course, MeasuredCourse
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.data.measurements import check_withheld
 from ferryid.diagnose.inference.group_differences import GROUPS
-from ferryid.diagnose.judging.diagnosis import SCHEMA, Diagnosis, Withheld, copies_as_json, finding_as_json, to_json
+from ferryid.diagnose.judging.diagnosis import (
+    SCHEMA,
+    Diagnosis,
+    Withheld,
+    copies_as_json,
+    finding_as_json,
+    to_json,
+    unused_as_json,
+)
 from ferryid.diagnose.judging.difference import Difference
 from ferryid.diagnose.judging.error_profiles import Profiled
 from ferryid.diagnose.judging.finding import UNKNOWN, Finding
@@ -45,6 +53,7 @@ __all__ = [
     "likeness_as_json",
     "separation",
     "to_json",
+    "unused_as_json",
     "versus_json",
     "worse_axes",
 ]

@@ -108,6 +108,23 @@ def gather(
     return Gathered(tuple(kept), (*notes, *why, *_clocks(kept)), copies)
 
 
+def unused(paths: Sequence[str], groups: Sequence[Group]) -> tuple[tuple[str, str], ...]:
+    """Return which of the given logs take part in no group, but for copies, and the sentence that says why."""
+    known = {one.path for group in groups for one in group.logs} | {
+        path for group in groups for path, _ in group.copies
+    }
+    start = f"Left out of the {CAMPAIGN}: "
+    notes = [note.removeprefix(start) for group in groups for note in group.notes if note.startswith(start)]
+    found = dict[str, str]()
+    for path in paths:
+        names = tuple(f"{name}:" for name in (path, Path(path).name, Path(path).stem))
+        # An error that names something else first, such as a file of the log, has the log's name behind it.
+        said = [note for note in notes if note.startswith(names)] or [note for note in notes if Path(path).stem in note]
+        if path not in known and said:
+            found[path] = start + said[0]
+    return tuple(found.items())
+
+
 def _unengaged(logs: Sequence[AveragedLog], profile: Profile) -> dict[str, FerryIdError]:
     """Return the errors of logs in which the actuators were not engaged, where others show that the vessel follows them."""
     responses = {one.path: one.screened.measured.response for one in logs}

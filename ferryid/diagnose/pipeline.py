@@ -15,6 +15,7 @@ from ferryid.diagnose.gathering import (
     engaged,
     gather,
     part,
+    unused,
     with_common_sensors,
     without_logs,
 )
@@ -119,7 +120,8 @@ def diagnose_campaign(
     """
     profile = settings.recorded(profile)
     groups = _groups(logs, _references(logs, profile, settings, run), profile, settings, run)
-    found = _diagnosed(groups, profile, settings, run)
+    left_out = unused(logs, groups)
+    found = [replace(one, unused=left_out) for one in _diagnosed(groups, profile, settings, run)]
     return tuple(sorted(found, key=lambda one: list(logs).index(one.path)))
 
 

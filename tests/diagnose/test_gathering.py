@@ -18,11 +18,13 @@ from ferryid.diagnose.gathering import (
     CAMPAIGN,
     REFERENCES,
     Gathered,
+    Group,
     _clocks,
     engaged,
     gather,
     part,
     sort_out,
+    unused,
     whole,
     without_logs,
 )
@@ -233,6 +235,19 @@ def test_a_log_says_whether_its_vessel_follows_the_applied_force(logs: tuple[Ave
     response = logs[0].screened.measured.response
     assert response is not None
     assert response.answered
+
+
+def test_logs_that_take_part_in_no_group_come_with_their_reasons(logs: tuple[AveragedLog, ...]) -> None:
+    start = "Left out of the campaign: "
+    notes = (
+        f"{start}run10: too short",
+        f"{start}a/run1.mcap: no velocity",
+        f"{start}the column t of run7 is empty",
+        "Other",
+    )
+    group = Group(logs[1:2], notes=notes, copies=(("b.mcap", logs[1].path),))
+    found = dict(unused([logs[1].path, "a/run1.mcap", "a/run10.mcap", "run7.csv", "b.mcap", "twice.mcap"], [group]))
+    assert found == {"a/run1.mcap": notes[1], "a/run10.mcap": notes[0], "run7.csv": notes[2]}
 
 
 def test_logs_whose_actuators_were_not_engaged_are_left_out(days: list[str], logs: tuple[AveragedLog, ...]) -> None:
