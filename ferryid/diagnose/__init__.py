@@ -12,6 +12,7 @@ from ferryid.diagnose.judging.diagnosis import (
     finding_as_json,
     parts_as_json,
     to_json,
+    unused_as_json,
 )
 from ferryid.diagnose.judging.difference import Difference
 from ferryid.diagnose.judging.error_profiles import Profiled
@@ -54,6 +55,7 @@ __all__ = [
     "parts_as_json",
     "separation",
     "to_json",
+    "unused_as_json",
     "versus_json",
     "worse_axes",
 ]

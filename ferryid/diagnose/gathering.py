@@ -20,6 +20,7 @@ from ferryid.diagnose.judging.diagnosis import distinct
 from ferryid.effects.wording import listed
 from ferryid.errors import FerryIdError
 from ferryid.files import resolved
+from ferryid.identify.engagement import unanswered_force, unengaged
 from ferryid.models import Model
 from ferryid.side_by_side import over
 from ferryid.signals.artificial import NO_RECORDING
@@ -31,6 +32,8 @@ from ferryid.vessel.profile import Profile
 
 OWN_HULLS = "The campaign is split: each side has a hull of its own, and a model is stored of the latest one."
 STAY = "They stay together here: what changed between them is in neither group's differences, and widens what is not known."
+CAMPAIGN, REFERENCES = "campaign", "references"
+"""What logs are left out of."""
 SHOWN_OVERLAPS = 3
 """Pairs of overlapping logs that are listed; the others are counted."""
 
@@ -108,7 +111,9 @@ def gather(
     errors = {path: one for path in joined.paths if isinstance(one := made[path], FerryIdError)}
     if not found:
         raise next(iter(errors.values()))
-    whose = "references" if references else "campaign"
+    errors |= _unengaged(found, profile)
+    found = [one for one in found if one.path not in errors]
+    whose = REFERENCES if references else CAMPAIGN
     notes = [*joined.notes, *left_out_of(whose, errors)]
     notes += [
         f"Given twice: {path}: it counts once"
@@ -121,6 +126,68 @@ def gather(
     kept = [one for one in kept if one.path not in copied]
     why += [_copied(path, other, whose) for path, other in copies]
     return Gathered(tuple(kept), (*notes, *why, *_clocks(kept)), copies, joined.parts)
+
+
+def unused(paths: Sequence[str], groups: Sequence[Group]) -> tuple[tuple[str, str], ...]:
+    """Return which of the given logs take part in no group, but for copies, and the sentence that says why."""
+    known = {one.path for group in groups for one in group.logs}
+    known |= {path for group in groups for path, _ in group.copies}
+    known |= {part.path for group in groups for parts in group.parts.values() for part in parts}
+    start = f"Left out of the {CAMPAIGN}: "
+    notes = [note.removeprefix(start) for group in groups for note in group.notes if note.startswith(start)]
+    found = dict[str, str]()
+    for path in paths:
+        names = tuple(f"{name}:" for name in (path, Path(path).name, Path(path).stem))
+        # An error that names something else first, such as a file of the log, has the log's name behind it.
+        said = [note for note in notes if note.startswith(names)] or [note for note in notes if Path(path).stem in note]
+        if path not in known and said:
+            found[path] = start + said[0]
+    return tuple(found.items())
+
+
+def _unengaged(logs: Sequence[AveragedLog], profile: Profile) -> dict[str, FerryIdError]:
+    """Return the errors of logs in which the actuators were not engaged, where others show that the vessel follows them."""
+    responses = {one.path: one.screened.measured.response for one in logs}
+    return {path: FerryIdError(f"{path}: {why}") for path, why in unengaged(responses, profile).items()}
+
+
+def _unanswered(logs: Sequence[AveragedLog], profile: Profile) -> tuple[str, ...]:
+    """Return a sentence on logs that are used though the vessel hardly follows the applied force in them."""
+    told = {one.path: unanswered_force(one.screened.measured.response, profile) for one in logs}
+    several = [(path, why) for path, why in told.items() if why]
+    if not several:
+        return ()
+    (path, why), more = several[0], len(several) - 1
+    what, _, remedy = why.partition(". Fix: ")
+    also = f" So it is in {counted(more, 'more log')}." if more else ""
+    return (
+        f"{path}: {what}. What is found of forces in such a log means little.{also} Fix: see whether the actuators were "
+        f"engaged, or {remedy}",
+    )
+
+
+def engaged(groups: Sequence[tuple[str, Gathered]], profile: Profile) -> tuple[Gathered, ...]:
+    """Return groups of logs of one vessel without those in which the actuators were not engaged, as logs of any group show.
+
+    A group of which none would be left keeps its logs, but for references. A sentence is on each log that is left out, and on
+    those that stay though the vessel hardly follows the applied force in them.
+
+    Parameters
+    ----------
+    groups
+        What each is called that logs are left out of, such as ``"campaign"``, and its logs.
+    profile
+        The vessel.
+    """
+    errors, found = _unengaged([one for _, group in groups for one in group.logs], profile), list[Gathered]()
+    for whose, group in groups:
+        here = {one.path: errors[one.path] for one in group.logs if one.path in errors}
+        kept = tuple(one for one in group.logs if one.path not in here)
+        # References are no more than help; what is diagnosed or compared is not empty.
+        without = bool(kept) or whose == REFERENCES
+        left_out, logs = (left_out_of(whose, here), kept) if without else ((), group.logs)
+        found.append(replace(group, logs=logs, notes=(*group.notes, *left_out, *_unanswered(logs, profile))))
+    return tuple(found)
 
 
 def _resolved(path: str) -> tuple[str, ...]:
@@ -300,9 +367,15 @@ def _parted(group: Group, profile: Profile, model: Model | None) -> list[Group]:
 
 
 def _why(split: Split) -> str:
-    return (
+    told = (
         f"held-out squared force error with one hull {split.ratio:.1f} times that with hulls of their own, likelihood of "
         f"held-out stretches {split.gain.total:+.0f} nat with these"
+    )
+    if not split.apart:
+        return told
+    return (
+        f"{told}; in what both sides show, the hulls differ by {100.0 * split.hulls.share:.0f} % of the larger one, in squares "
+        f"{split.hulls.scatter:.1f} times as far as a log from the others of its side"
     )
 
 
@@ -324,7 +397,7 @@ def _without_references(group: Group, paths: set[str], split: Split) -> Group:
 def _left_out(group: Group, path: str, split: Split, others: int) -> Group:
     note = (
         f"Left out of the campaign: {path}: no common hull fits it and the {counted(others, 'other log')} ({_why(split)}); "
-        "another vessel, or its hull or load changed. Fix: diagnose it with --each, or with the right profile"
+        "another vessel, or its hull or load changed. Fix: diagnose it with --each, or with the right profile, or leave it out"
     )
     kept = tuple(one for one in group.logs if one.path != path)
     return replace(group, logs=kept, notes=(*group.notes, note))
@@ -345,7 +418,7 @@ def _halves(group: Group, inside: set[str], outside: set[str], split: Split) -> 
     first, second = (_names(group, {one.path for one in logs}) for logs in parts)
     note = (
         f"No common hull fits {first} on one side and {second} on the other ({_why(split)}). The hull or the load changed "
-        "between them, or one side is of another vessel."
+        "between them, or one side is of another vessel. Fix: diagnose each side by itself, with its own profile"
     )
     return [
         replace(

@@ -8,10 +8,14 @@ from functools import partial
 from pathlib import PurePath
 
 from ferryid.diagnose.gathering import (
+    CAMPAIGN,
+    REFERENCES,
     Gathered,
     Group,
+    engaged,
     gather,
     part,
+    unused,
     with_common_sensors,
     without_logs,
 )
@@ -120,7 +124,9 @@ def diagnose_campaign(
     """
     profile = settings.recorded(profile)
     references = _references(logs, profile, settings, run, join=join)
-    found = _diagnosed(_groups(logs, references, profile, settings, run, join=join), profile, settings, run)
+    groups = _groups(logs, references, profile, settings, run, join=join)
+    left_out = unused(logs, groups)
+    found = [replace(one, unused=left_out) for one in _diagnosed(groups, profile, settings, run)]
     place = {path: k for k, path in reversed(list(enumerate(logs)))}
     return tuple(sorted(found, key=lambda one: min(place[path] for path in one.paths)))
 
@@ -151,10 +157,11 @@ def _groups(
 ) -> tuple[Group, ...]:
     """Return the logs that can be used, in groups of one hull each."""
     gathered = gather(logs, profile, run, withhold=settings.withhold, join=join)
-    if settings.against is not None:
-        return (Group(gathered.logs, notes=gathered.notes, copies=gathered.copies),)
     if references.logs:
         references = without_logs(references, gathered.logs)
+    gathered, references = engaged(((CAMPAIGN, gathered), (REFERENCES, references)), profile)
+    if settings.against is not None:
+        return (Group(gathered.logs, notes=gathered.notes, copies=gathered.copies),)
     run.progress("comparing the sensors of the logs")
     screened = with_common_sensors([*gathered.logs, *references.logs])
     gathered, references = (

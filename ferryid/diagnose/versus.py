@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ferryid.counts import counted
-from ferryid.diagnose.gathering import gather, whole, with_common_sensors
+from ferryid.diagnose.gathering import CAMPAIGN, engaged, gather, whole, with_common_sensors
 from ferryid.diagnose.inference.campaign import assemble, repeated
 from ferryid.diagnose.inference.group_differences import GROUPS, in_groups
 from ferryid.diagnose.inference.stages import AveragedLog
@@ -95,8 +95,10 @@ def compare_groups(
     profile = settings.recorded(profile)
     averaged, notes = list[AveragedLog](), list[str]()
     name_of: dict[str, str] = {}
-    for group, paths in zip(GROUPS, (logs, versus), strict=True):
-        found = gather(list(dict.fromkeys(paths)), profile, run, withhold=settings.withhold)
+    gathered = [
+        gather(list(dict.fromkeys(paths)), profile, run, withhold=settings.withhold) for paths in (logs, versus)
+    ]
+    for group, found in zip(GROUPS, engaged([(CAMPAIGN, one) for one in gathered], profile), strict=True):
         run.progress(f"comparing the hulls of group {group}")
         found = whole(found, profile, settings.model)
         # What differs between the groups is not to be pooled away.

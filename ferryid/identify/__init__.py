@@ -2,7 +2,7 @@
 
 from ferryid.identify.acceptance import Acceptance, accept, accept_on_motions, force_mse
 from ferryid.identify.archive import fit_archive, keep_for_archive
-from ferryid.identify.inputs import read_logs, usable_logs
+from ferryid.identify.inputs import read_logs
 from ferryid.identify.model_selection import Selection
 from ferryid.identify.outcome import ComponentCurve, Excitation, FitOutcome, LogFit
 from ferryid.identify.physical_checks import inertia_checks
@@ -33,6 +33,5 @@ __all__ = [
     "parse_windows",
     "prediction_errors",
     "read_logs",
-    "usable_logs",
     "with_remainder",
 ]

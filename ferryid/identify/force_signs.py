@@ -6,13 +6,12 @@ a window is averaged away, and with it what shows that its thrusters are exchang
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ferryid.errors import ReversedForcesError
-from ferryid.identify.contradictions import signs_of, unanswered, wrong_size, wrong_way
+from ferryid.identify.contradictions import signs_of, unanswered, wrong_way
 from ferryid.identify.inertia import relative_inertia, without_inertia
 from ferryid.identify.motion_data import LogData
 from ferryid.identify.split import Split
@@ -22,7 +21,6 @@ from ferryid.log_warnings import log_warnings
 from ferryid.models.forces import ACCELERATIONS
 from ferryid.regression import CrossProducts
 from ferryid.types import AXES, Flags, Floats, Ints
-from ferryid.vessel.order_response import orders_alone
 from ferryid.vessel.profile import Profile
 
 
@@ -190,31 +188,3 @@ def _undecided(found: ForceResponse, profile: Profile) -> str:
         f"These logs do not show whether the yaw moment acts the right way round: the vessel follows it by {value:.2g} ± "
         f"{spread:.2g} of what the base model expects, and {' or '.join(causes)} would look alike. Record turns to both sides."
     )
-
-
-def unengaged(responses: Mapping[str, ForceResponse | None], profile: Profile) -> dict[str, str]:
-    """Return, of several logs, those in which the actuators were not engaged, and a sentence on each, with its remedy.
-
-    None where more logs show that the vessel does not follow the applied force than show that it does: the profile is wrong
-    then, and what a fit to all of them is refused for says where.
-
-    Parameters
-    ----------
-    responses
-        How the vessel accelerates in each log, by the log's path; None where that is not known.
-    profile
-        The vessel.
-    """
-    known = {path: one for path, one in responses.items() if one is not None}
-    without = {path: one for path, one in known.items() if one.unanswered}
-    if len(without) > sum(one.answered for one in known.values()):
-        return {}
-    found = {}
-    for path, one in without.items():
-        orders = orders_alone(profile)
-        told = wrong_size(one.response, one.spread, one.share, profile.name, one.sigmas, orders=orders)
-        found[path] = (
-            f"{told.partition('. Fix: ')[0]}. In other logs the vessel follows them. Fix: see whether the actuators were "
-            "engaged in this log, or give it a profile of its own"
-        )
-    return found

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError, with_sentence
-from ferryid.identify.force_signs import ForceResponse, force_response, unengaged
+from ferryid.identify.engagement import unengaged
+from ferryid.identify.force_signs import ForceResponse, force_response
 from ferryid.identify.motion_data import prepared_data
 from ferryid.identify.settings import FitSettings
 from ferryid.signals.consistency import comparable
@@ -23,7 +24,13 @@ from ferryid.vessel.profile import Profile
 
 
 def read_logs(
-    paths: Sequence[str], profile: Profile, settings: FitSettings, run: RunContext, *, whole: bool = True
+    paths: Sequence[str],
+    profile: Profile,
+    settings: FitSettings,
+    run: RunContext,
+    *,
+    whole: bool = True,
+    usable_only: bool = False,
 ) -> list[Opened]:
     """Read several logs and align their signals, before smoothing; they are returned in order of time.
 
@@ -31,13 +38,15 @@ def read_logs(
     where a log's times are no dates, and of logs that begin at once.
 
     With `whole` False, their recordings are `compact`, which leaves a third of the memory where nobody asks for the quality of
-    their signals.
+    their signals. With `usable_only` those that a fit cannot use are left out.
 
     Raises
     ------
     FerryIdError
-        For a log that cannot be used, and one that is given twice.
+        For a log that cannot be used, with `usable_only` where none can, and one that is given twice.
     """
+    if usable_only:
+        return _in_time(_usable(paths, profile, settings, run, {}, whole=whole))
     read = _reader(profile, settings, run, whole)
     return _in_time([read(path) for path in paths])
 
@@ -52,15 +61,12 @@ class UsableLogs:
         The logs.
     left_out
         Why each of the others is left out, as sentences.
-    paths
-        Those of the logs, in the order in which they were given.
     notes
         Which short logs are used as one, as a sentence.
     """
 
     opened: list[Opened]
     left_out: tuple[str, ...] = ()
-    paths: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
     def beside(self, error: FerryIdError) -> str:
@@ -101,15 +107,20 @@ def usable_logs(
         # A part that cannot be used takes no other with it.
         joined, errors = Contiguous(tuple(paths), {}), {}
         found = _usable(paths, profile, settings, run, errors)
-    kept = tuple(path for path, _ in found)
-    return UsableLogs(_in_time([one for _, one in found]), left_out_of(whole, errors), kept, joined.notes)
+    return UsableLogs(_in_time(found), left_out_of(whole, errors), joined.notes)
 
 
 def _usable(
-    paths: Sequence[str], profile: Profile, settings: FitSettings, run: RunContext, errors: dict[str, FerryIdError]
-) -> list[tuple[str, Opened]]:
-    """Return the logs of `usable_logs` with their paths, and put the errors of the others into `errors`."""
-    read, alone = _reader(profile, settings, run), len(paths) == 1
+    paths: Sequence[str],
+    profile: Profile,
+    settings: FitSettings,
+    run: RunContext,
+    errors: dict[str, FerryIdError],
+    *,
+    whole: bool = True,
+) -> list[Opened]:
+    """Return the logs of `usable_logs`, and put the errors of the others into `errors`; `whole` as of `read_logs`."""
+    read, alone = _reader(profile, settings, run, whole), len(paths) == 1
     responses: dict[str, ForceResponse | None] = {}
 
     def examined(path: str) -> tuple[str, Opened]:
@@ -120,7 +131,7 @@ def _usable(
 
     found = list(usable(paths, examined, errors, lambda made: comparable(made[1].track)))
     errors.update({path: FerryIdError(f"{path}: {why}") for path, why in unengaged(responses, profile).items()})
-    return [(path, one) for path, one in found if path not in errors]
+    return [one for path, one in found if path not in errors]
 
 
 def _response(one: Opened, profile: Profile, settings: FitSettings) -> ForceResponse | None:

@@ -19,6 +19,7 @@ from ferryid.diagnose import (
     likeness_as_json,
     parts_as_json,
     to_json,
+    unused_as_json,
 )
 from ferryid.errors import FerryIdError
 from ferryid.files import finite
@@ -150,6 +151,7 @@ def as_json(diagnoses: Sequence[Diagnosis]) -> dict[str, Any]:
     for one in logs:
         # They are the campaign's.
         one.pop("copies", None)
+        one.pop("logs_left_out", None)
     together = second_sources.of_all(diagnoses)
     if together is not None:
         for one in logs:
@@ -173,6 +175,7 @@ def as_json(diagnoses: Sequence[Diagnosis]) -> dict[str, Any]:
         "withheld": [],
         **({"second_sources": together.to_json()} if together else {}),
         **({"copies": copies} if (copies := copies_as_json(diagnoses)) else {}),
+        **({"logs_left_out": unused} if (unused := unused_as_json(diagnoses)) else {}),
         **next(({"learned": one.learned.to_json()} for one in diagnoses if one.learned is not None), {}),
         **next(({"likeness": likeness_as_json(one.likeness_of_all)} for one in diagnoses if one.likeness_of_all), {}),
         # What several logs teach is one model.

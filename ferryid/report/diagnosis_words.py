@@ -22,6 +22,8 @@ INCREDIBLE = 3.0
 """Standard deviations as of which a coefficient of the hull has moved farther than is credible."""
 NAMED_UNSEEN = 3
 """Effects of which a verdict says that the log would never have shown them; the others are counted."""
+SHOWN_UNUSED = 5
+"""Logs left out of a campaign that its summary names; the others are counted."""
 SPANS = 4
 """Intervals that are told."""
 RIVALS = 3
@@ -411,7 +413,7 @@ def model_of_all(diagnoses: Sequence[Diagnosis]) -> str:
 def summary(diagnoses: Sequence[Diagnosis]) -> str:
     """Return the verdict in one sentence, of one log or of several."""
     if len(diagnoses) == 1:
-        return " ".join(filter(None, (headline(diagnoses[0]), copies(diagnoses))))
+        return " ".join(filter(None, (headline(diagnoses[0]), copies(diagnoses), unused(diagnoses))))
     counts = [
         f"{sum(one.verdict == verdict for one in diagnoses)} {verdict.replace('_', ' ')}"
         for verdict in dict.fromkeys(one.verdict for one in diagnoses)
@@ -436,7 +438,7 @@ def summary(diagnoses: Sequence[Diagnosis]) -> str:
         parts.append(f"Perhaps the model {'also ' if sure else ''}left out {listed(perhaps)}.")
     if unknown := _without_a_name("More" if named else "Something", every):
         parts.append(unknown)
-    return " ".join(filter(None, (*parts, copies(diagnoses))))
+    return " ".join(filter(None, (*parts, copies(diagnoses), unused(diagnoses))))
 
 
 def copies(diagnoses: Sequence[Diagnosis]) -> str:
@@ -447,6 +449,19 @@ def copies(diagnoses: Sequence[Diagnosis]) -> str:
     told = listed([f"{PurePath(path).name} (of {PurePath(other).name})" for path, other in found])
     are = "log is a copy and" if len(found) == 1 else "logs are copies and"
     return f"{len(found)} further {are} left out of the estimate: {told}."
+
+
+def unused(diagnoses: Sequence[Diagnosis]) -> str:
+    """Return which other logs are left out of a campaign, as a sentence; empty where none is. The notes give the reasons."""
+    found = list(dict.fromkeys(path for one in diagnoses for path, _ in one.unused))
+    if not found:
+        return ""
+    names = [PurePath(path).name for path in found[:SHOWN_UNUSED]]
+    more = len(found) - len(names)
+    names += [f"{more} more"] if more else []
+    return (
+        f"{counted(len(found), 'log')} {'is' if len(found) == 1 else 'are'} left out of the campaign: {listed(names)}."
+    )
 
 
 def about_errors(diagnosis: Diagnosis) -> list[str]:

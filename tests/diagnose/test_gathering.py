@@ -3,21 +3,38 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from threading import Barrier
 from typing import Any
 
+import numpy as np
 import pytest
 
 from ferryid import side_by_side
 from ferryid.diagnose import gathering
-from ferryid.diagnose.gathering import Gathered, _clocks, gather, part, sort_out, whole, without_logs
+from ferryid.diagnose.gathering import (
+    CAMPAIGN,
+    REFERENCES,
+    Gathered,
+    Group,
+    _clocks,
+    engaged,
+    gather,
+    part,
+    sort_out,
+    unused,
+    whole,
+    without_logs,
+)
 from ferryid.diagnose.inference.stages import AveragedLog
 from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.errors import FerryIdError
+from ferryid.identify.engagement import ForceResponse
 from ferryid.simulate import parse_scenario, simulate, write_log
 from ferryid.types import IN_MEMORY
+from ferryid.vessel import load_profile
 from tests.diagnose.trials import FERRY
 
 pytestmark = pytest.mark.slow
@@ -206,3 +223,69 @@ def test_a_piece_of_a_log_is_left_out(tmp_path: Path) -> None:
     found = gather([str(fixtures / "short.mcap"), str(fixtures / "short_ros2")], FERRY, IN_MEMORY)
     assert [Path(one.path).name for one in found.logs] == ["short.mcap"]
     assert [Path(path).name for path, _ in found.copies] == ["short_ros2"]
+
+
+def adrift(log: AveragedLog) -> AveragedLog:
+    """Return a log in which the vessel follows the applied force by a hundredth."""
+    response = ForceResponse(np.full(3, 0.01), np.full(3, 0.002), np.full(3, 4.0), np.ones(3, dtype=bool), np.ones(3))
+    return replace(log, screened=replace(log.screened, measured=replace(log.screened.measured, response=response)))
+
+
+def test_a_log_says_whether_its_vessel_follows_the_applied_force(logs: tuple[AveragedLog, ...]) -> None:
+    response = logs[0].screened.measured.response
+    assert response is not None
+    assert response.answered
+
+
+def test_logs_that_take_part_in_no_group_come_with_their_reasons(logs: tuple[AveragedLog, ...]) -> None:
+    start = "Left out of the campaign: "
+    notes = (
+        f"{start}run10: too short",
+        f"{start}a/run1.mcap: no velocity",
+        f"{start}the column t of run7 is empty",
+        "Other",
+    )
+    group = Group(logs[1:2], notes=notes, copies=(("b.mcap", logs[1].path),))
+    found = dict(unused([logs[1].path, "a/run1.mcap", "a/run10.mcap", "run7.csv", "b.mcap", "twice.mcap"], [group]))
+    assert found == {"a/run1.mcap": notes[1], "a/run10.mcap": notes[0], "run7.csv": notes[2]}
+
+
+def test_logs_whose_actuators_were_not_engaged_are_left_out(days: list[str], logs: tuple[AveragedLog, ...]) -> None:
+    (found,) = engaged([(CAMPAIGN, Gathered((logs[0], adrift(logs[1]), logs[2]), ("before",)))], FERRY)
+    assert paths(found.logs) == [days[0], days[2]]
+    before, note = found.notes
+    assert before == "before"
+    assert note.startswith(
+        f"Left out of the campaign: {days[1]}: the applied forces accelerate the vessel by surge 0.01"
+    )
+    assert "In other logs the vessel follows them. Fix: see whether the actuators were engaged in this log" in note
+
+
+def test_the_logs_of_another_group_show_it_too(days: list[str], logs: tuple[AveragedLog, ...]) -> None:
+    references = Gathered((adrift(logs[1]),))
+    campaign, left = engaged([(CAMPAIGN, Gathered(logs[:1])), (REFERENCES, references)], FERRY)
+    assert (campaign, left.logs) == (Gathered(logs[:1]), ())
+    assert left.notes[0].startswith(f"Left out of the references: {days[1]}: the applied forces")
+    # What is to be diagnosed or compared stays, as there is nothing else.
+    _, alone = engaged([(CAMPAIGN, Gathered(logs[:1])), (CAMPAIGN, references)], FERRY)
+    assert paths(alone.logs) == [days[1]]
+    assert "What is found of forces in such a log means little. Fix:" in alone.notes[0]
+
+
+def test_a_log_by_itself_comes_with_what_explains_that_its_force_has_no_answer(
+    days: list[str], logs: tuple[AveragedLog, ...]
+) -> None:
+    (found,) = engaged([(CAMPAIGN, Gathered((adrift(logs[0]), adrift(logs[1]), logs[2])))], FERRY)
+    assert len(found.logs) == 3
+    (note,) = found.notes
+    assert note.startswith(f"{days[0]}: the applied forces accelerate the vessel by surge 0.01")
+    assert "So it is in 1 more log. Fix: see whether the actuators were engaged, or in milliampere, correct" in note
+    assert "Left out" not in note
+    assert engaged([(CAMPAIGN, Gathered(logs[:1]))], FERRY) == (Gathered(logs[:1]),)
+
+
+def test_an_unengaged_run_of_the_catamaran_is_left_out_of_its_campaign(shared_data: Callable[[str], Path]) -> None:
+    bags = [str(one) for one in sorted(shared_data("vtec_usv").glob("*.bag"))[:4]]
+    found = gather(bags, load_profile("vtec-usv"), IN_MEMORY)
+    assert [Path(one.path).name[:5] for one in found.logs] == ["48000", "exp37", "exp38"]
+    assert "52000_2016-02-11-10-40-10.bag: the applied forces accelerate the vessel by surge 0.0" in found.notes[0]

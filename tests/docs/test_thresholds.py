@@ -122,6 +122,7 @@ NO_DECISION = {
         diagnose.checks.contradiction SHIFTS_S MOST_ACTUATORS
         diagnose.checks.kinematics SIZE TINY_S STEPS
         diagnose.checks.pooling ROUNDS
+        diagnose.judging.campaign_split ROUNDS
         diagnose.inference.campaign_estimation ROUNDS SETTLED CONVERGED_GAIN RELAXATION KEPT_SLOPES
         diagnose.inference.campaign_course KNOTS_A_MEMORY MOST_KNOTS
         diagnose.inference.campaign_model DIFFERENCE_STEP

@@ -14,7 +14,7 @@ from ferryid.diagnose.judging.finding import Estimate
 from ferryid.diagnose.judging.hidden_gain import HiddenGain
 from ferryid.diagnose.judging.hidden_signal import with_gains
 from ferryid.report.campaign import _sizes
-from ferryid.report.diagnosis_page import as_text
+from ferryid.report.diagnosis_page import as_text, render
 from ferryid.report.diagnosis_report import as_json, report
 from ferryid.report.diagnosis_timeline import timelines
 from ferryid.report.diagnosis_words import estimate, notes_of, numbers_of, title
@@ -166,6 +166,27 @@ def test_a_copy_has_its_sentence_in_the_summary() -> None:
         told = " ".join(as_text(shown).split())
         assert "1 further log is a copy and left out of the estimate: again.bag (of first.bag)." in told
     assert "a copy" not in as_text(campaign())
+
+
+def test_logs_that_are_left_out_have_their_sentence_in_the_summary() -> None:
+    unused = (
+        ("/logs/towed.bag", "Left out of the campaign: /logs/towed.bag: not engaged"),
+        ("/logs/b.csv", "Left out"),
+    )
+    several = [replace(one, unused=unused) for one in campaign()]
+    for shown in (several, several[:1]):
+        assert "2 logs are left out of the campaign: towed.bag and b.csv." in " ".join(as_text(shown).split())
+        assert as_json(shown)["logs_left_out"] == [{"log": path, "says": says} for path, says in unused]
+    assert all("logs_left_out" not in one for one in as_json(several)["logs"])
+    one = [replace(several[0], unused=unused[:1])]
+    assert "1 log is left out of the campaign: towed.bag." in " ".join(as_text(one).split())
+    many = [replace(several[0], unused=tuple((f"/logs/{k}.bag", "Left out") for k in range(9)))]
+    assert "9 logs are left out of the campaign: 0.bag, 1.bag, 2.bag, 3.bag, 4.bag and 4 more." in " ".join(
+        as_text(many).split()
+    )
+    assert "left out of the campaign" not in as_text(campaign())
+    assert "logs_left_out" not in as_json(campaign())
+    assert "2 logs are left out of the campaign" in " ".join(render(several, "t")[0].split())
 
 
 def test_a_number_without_an_interval_is_told_once() -> None:

@@ -12,6 +12,7 @@ from ferryid.diagnose.data.thresholds import DATA
 from ferryid.effects.force_model import Measurements
 from ferryid.effects.measurements import actuation_of, actuator_forces, interpolate_gaps, rudder_states
 from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.identify.engagement import ForceResponse, force_response_of
 from ferryid.models import validity_ranges
 from ferryid.regression import averaged_out
 from ferryid.signals.align import align
@@ -20,7 +21,7 @@ from ferryid.signals.complementary_filter import CUBIC_S, complementary_filter
 from ferryid.signals.consistency import comparable
 from ferryid.signals.data_quality import left_out_sentences, repair_sentences
 from ferryid.signals.faults import find_faults
-from ferryid.signals.prepare import doubts_of
+from ferryid.signals.prepare import Opened, doubts_of
 from ferryid.signals.recording import Recording, record
 from ferryid.signals.sampling import check_sampling
 from ferryid.signals.smooth import Measured, measure, odd_rows, smooth_measured, steady_cubic
@@ -125,11 +126,15 @@ class Survey:
 
 @dataclass(frozen=True)
 class MeasuredLog:
-    """A log as it was measured: the first stage of a diagnosis."""
+    """A log as it was measured: the first stage of a diagnosis.
+
+    `response` is how the vessel accelerates under the applied force; None where the log does not show it.
+    """
 
     path: str
     measurements: Measurements
     survey: Survey
+    response: ForceResponse | None = None
 
 
 def measure_log(
@@ -140,9 +145,10 @@ def measure_log(
     withhold: Sequence[str] = (),
 ) -> MeasuredLog:
     """Read and align a log, of which samples and motion are not kept; parameters and errors as of `read_measurements`."""
-    measurements, survey = read_measurements(path, profile, run, withhold=withhold)
+    measurements, survey, opened = _read(path, profile, run, withhold, CUBIC_S)
     # A campaign holds all of its logs at once: what is needed of none is let go.
-    return MeasuredLog(path, measurements, replace(survey, recording=compact(survey.recording), motion=None))
+    survey = replace(survey, recording=compact(survey.recording), motion=None)
+    return MeasuredLog(path, measurements, survey, force_response_of(opened, profile))
 
 
 def read_measurements(
@@ -176,6 +182,13 @@ def read_measurements(
     FerryIdError
         For a log that cannot be used, one without actuators or heading, and a signal to withhold that it does not have.
     """
+    return _read(path, profile, run, withhold, window_s)[:2]
+
+
+def _read(
+    path: str, profile: Profile, run: RunContext, withhold: Sequence[str], window_s: float
+) -> tuple[Measurements, Survey, Opened]:
+    """Return what `read_measurements` does, and the log before smoothing."""
     check_withheld(withhold)
     if not profile.actuators:
         raise FerryIdError(
@@ -228,7 +241,7 @@ def read_measurements(
         tuple(sorted({fault.signal for fault in faults.poses if not fault.left_out})),
         averaged_out(profile, [motion]).says,
     )
-    return measurements, survey
+    return measurements, survey, Opened(recording, track, measured)
 
 
 def window_lengths(profile: Profile) -> tuple[float, float]:

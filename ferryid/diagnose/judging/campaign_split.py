@@ -29,6 +29,45 @@ from ferryid.types import Flags, Floats, Ints
 
 WEIGHED = 4
 """Ways to part a campaign that are judged on held-out data, the likeliest of each kind."""
+ROUNDS = 8
+"""Most rounds in which logs are put to the part that they are nearer to."""
+
+
+@dataclass(frozen=True)
+class HullDistance:
+    """How far the hulls of two parts of a campaign are apart, in what both parts show.
+
+    Attributes
+    ----------
+    evidence
+        Half the squared distance over its covariance, in which logs differ about a hull as much as within the parts [nat].
+    scatter
+        That squared distance over its expectation, over the greatest of a log to the others of its part; 0 where no part has
+        logs enough to show how they scatter.
+    share
+        The distance over the larger of the two hulls, in the same units; what is expected of equal hulls is taken off.
+    """
+
+    evidence: float
+    scatter: float
+    share: float
+
+    @property
+    def far(self) -> bool:
+        """True where equal hulls are not so far apart, logs of one part much nearer, and the difference is much of a hull."""
+        return (
+            self.evidence >= JUDGING.split_evidence
+            and self.scatter >= JUDGING.split_scatter
+            and self.share >= JUDGING.split_share
+        )
+
+    @property
+    def still_far(self) -> bool:
+        """True where that remains beside conditions that each log may have."""
+        return self.evidence >= JUDGING.split_kept * JUDGING.split_evidence and self.share >= JUDGING.split_share
+
+
+NO_DISTANCE = HullDistance(0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -44,11 +83,14 @@ class Split:
     ratio
         Held-out squared force error with the common hull over that with the part's own: geometric mean over logs and axes of a
         part, the greater of the two.
+    hulls
+        How far the hulls of the parts are apart.
     """
 
     inside: Flags
     gain: Gain
     ratio: float
+    hulls: HullDistance = NO_DISTANCE
 
     @property
     def likely(self) -> bool:
@@ -63,6 +105,11 @@ class Split:
     def found(self) -> bool:
         """True where they predict them far better."""
         return self.gain.total >= JUDGING.split_gain
+
+    @property
+    def apart(self) -> bool:
+        """True where they predict them far better, and the hulls are farther apart than logs of one vessel are."""
+        return self.found and self.gain.low >= JUDGING.split_surely and self.hulls.far
 
 
 def find_split(campaign: Campaign, reference: Flags) -> Split | None:
@@ -86,20 +133,31 @@ def find_split(campaign: Campaign, reference: Flags) -> Split | None:
 
 
 def _found(campaign: Campaign, reference: Flags) -> Split | None:
-    bare = _judged(estimate_campaign(without_conditions(campaign)), _ways(reference))
+    fit = estimate_campaign(without_conditions(campaign))
+    bare = _judged(fit, _ways(reference))
     likely = [one for one in bare if one.likely]
     # Where a wind that nobody measured is most of the force error, another hull makes little of it.
     hidden = [one for one in bare if one.found and one.gain.low > 0.0] if campaign.conditions else []
-    if not likely and not hidden:
-        return None
-    best = max(likely or hidden, key=lambda one: one.gain.total)
-    if campaign.conditions:
+    alike = _Logs(fit).alike()
+    apart = [one for one in (*bare, *(_judged(fit, alike) if alike else ())) if one.apart]
+    best = [max(some, key=lambda one: one.gain.total) for some in (likely or hidden, apart) if some]
+    tried = list({one.inside.tobytes(): one for one in best}.values())
+    if tried and campaign.conditions:
         # A wind or a current of one log must not look like another hull, nor hide one.
-        (beside,) = _judged(estimate_campaign(campaign), [best.inside])
-        if not likely and not beside.likely:
-            return None
-        best = replace(best, gain=beside.gain, ratio=best.ratio if likely else beside.ratio)
-    return best if best.found else None
+        made = estimate_campaign(campaign)
+        tried = [one for one in (_beside(made, way) for way in tried) if one is not None]
+    return max((one for one in tried if one.found), key=lambda one: one.gain.total, default=None)
+
+
+def _beside(made: CampaignFit, way: Split) -> Split | None:
+    """Return a way to part logs as it is judged beside the conditions that they may have; None where these explain it."""
+    (beside,) = _judged(made, [way.inside])
+    if way.apart and beside.hulls.still_far:
+        # What is held out of a log by itself is predicted from little beside a wind of its own: the hulls decide.
+        return way
+    if not way.likely and not beside.likely:
+        return None
+    return replace(way, gain=beside.gain, ratio=way.ratio if way.likely else beside.ratio)
 
 
 def _ways(reference: Flags) -> list[Flags]:
@@ -111,6 +169,11 @@ def _ways(reference: Flags) -> list[Flags]:
     if reference.any() and not reference.all():
         ways.append(reference)
     # Of two logs it is one way.
+    return _different(ways)
+
+
+def _different(ways: Sequence[Flags]) -> list[Flags]:
+    """Return ways by their smaller parts, each once."""
     return list({tuple(min(one, ~one, key=_smaller).tolist()): min(one, ~one, key=_smaller) for one in ways}.values())
 
 
@@ -137,12 +200,64 @@ class _Logs:
 
     def apart(self, inside: Flags) -> float:
         """Return how far the hulls of two parts are apart, by how uncertain they are: squared, over its expectation."""
-        (A, first), (B, second) = (self._belief(np.flatnonzero(one)) for one in (inside, ~inside))
-        away = np.linalg.solve(A, first) - np.linalg.solve(B, second)
-        covariance = np.linalg.inv(A) + np.linalg.inv(B)
-        # Directions of which a part knows nothing differ by nothing but the prior.
-        known = float(np.trace(np.eye(len(A)) - 0.5 * covariance))
-        return float(away @ np.linalg.solve(covariance, away)) / max(known, 1.0)
+        return _distance(*(self._belief(np.flatnonzero(one)) for one in (inside, ~inside))).relative
+
+    def hulls(self, parts: Sequence[Ints]) -> HullDistance:
+        """Return how far the hulls of two parts are apart, by how uncertain logs that differ within the parts leave them."""
+        factor = max(self.disagreement(one) for one in parts)
+        found = _distance(*(self._belief(one, factor) for one in parts))
+        several = [one for one in parts if len(one) >= JUDGING.split_scattering]
+        within = [self._to_others(i, one, factor) for one in several for i in one.tolist()]
+        # Logs of one vessel are as far apart as expected, at the least.
+        scatter = found.relative / max(1.0, *within) if within else 0.0
+        sizes = []
+        for A, b in (self._belief(one, factor) for one in parts):
+            hull = self._whole(self.made.common + np.linalg.solve(A, b))
+            sizes.append(float(hull @ np.linalg.solve(found.covariance, hull)))
+        share = np.sqrt(max(found.squared - found.expected, 0.0) / max(*sizes, 1e-12))
+        return HullDistance(0.5 * found.squared, float(scatter), float(share))
+
+    def _to_others(self, i: int, part: Ints, factor: float) -> float:
+        return _distance(self._belief(np.array([i]), factor), self._belief(part[part != i], factor)).relative
+
+    def _whole(self, common: Floats) -> Floats:
+        """Return the vector of all logs with the hull counted from none instead of from what was believed of it."""
+        hull, whole = self.made.campaign.hull, np.zeros_like(common)
+        free = hull.free
+        whole[free] = (hull.root @ common[: len(hull.mean)] + hull.mean)[free] / hull.spread[free]
+        return whole
+
+    def alike(self) -> list[Flags]:
+        """Return parts of logs that are nearer to each other than to the rest, from every log on; none of few logs."""
+        count = len(self.made.parts)
+        if count <= JUDGING.split_scattering:
+            return []
+        every = np.arange(count)
+        factor = max(1.0, min(self.made.disagreement, JUDGING.usual_disagreement))
+        own = [self._belief(np.array([i]), factor) for i in range(count)]
+        ways = []
+        for i in range(count):
+            inside = every == i
+            for _ in range(ROUNDS):
+                parts = [every[inside], every[~inside]]
+                nearer = np.array([self._nearer(own[j], j, parts, factor) for j in range(count)])
+                if nearer.all() or not nearer.any() or np.array_equal(nearer, inside):
+                    break
+                inside = nearer
+            if 1 < inside.sum() < count - 1:
+                ways.append(inside)
+        return _different(ways)
+
+    def _nearer(self, own: tuple[Floats, Floats], j: int, parts: Sequence[Ints], factor: float) -> bool:
+        """Return whether a log is likelier one of the first part than one of the second."""
+        losses = []
+        for part in parts:
+            others = part[part != j]
+            if not len(others):
+                return bool(part is parts[0])
+            found = _distance(own, self._belief(others, factor))
+            losses.append(found.squared + float(np.linalg.slogdet(found.covariance)[1]))
+        return losses[0] < losses[1]
 
     def split(self, inside: Flags) -> Split:
         """Judge one way to part the logs, by held-out blocks."""
@@ -161,7 +276,7 @@ class _Logs:
         found = over(judged, every.tolist())
         ratios = np.stack([one for _, one in found])
         ratio = max(float(np.exp(np.mean(ratios[one]))) for one in (inside, ~inside))
-        return Split(inside, Gain.of(np.concatenate([gains for gains, _ in found])), ratio)
+        return Split(inside, Gain.of(np.concatenate([gains for gains, _ in found])), ratio, self.hulls(parts))
 
     def disagreement(self, which: Ints) -> float:
         """Return the variance by which some logs differ about their own common hull over that of their noise, at least 1."""
@@ -207,6 +322,30 @@ class _Logs:
             squares.append(float(np.sum((part.gaps[block] + part.slopes[block] @ step) ** 2)))
             errors[block] += slopes[block] @ step
         return np.array(squares), errors
+
+
+@dataclass(frozen=True)
+class _Distance:
+    """How far two hulls are apart: squared, over its covariance, shape (g, g), and what is expected of equal ones."""
+
+    squared: float
+    expected: float
+    covariance: Floats
+
+    @property
+    def relative(self) -> float:
+        """The square over its expectation."""
+        return self.squared / max(self.expected, 1.0)
+
+
+def _distance(one: tuple[Floats, Floats], other: tuple[Floats, Floats]) -> _Distance:
+    """Return how far two hulls are apart, each given by its precision, and that times its mean."""
+    (A, first), (B, second) = one, other
+    away = np.linalg.solve(A, first) - np.linalg.solve(B, second)
+    covariance = np.asarray(np.linalg.inv(A) + np.linalg.inv(B), dtype=np.float64)
+    # Directions of which a part knows nothing differ by nothing but the prior.
+    expected = float(np.trace(np.eye(len(A)) - 0.5 * covariance))
+    return _Distance(float(away @ np.linalg.solve(covariance, away)), expected, covariance)
 
 
 def _gains(one: Floats, two: Floats, count: int) -> Floats:

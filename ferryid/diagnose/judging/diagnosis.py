@@ -127,6 +127,8 @@ class Diagnosis:
         Name or path that the vessel's profile is given by; empty where it is known from a model alone.
     copies
         Logs of its campaign that are left out since they hold the motion of another: their paths and that of the other.
+    unused
+        Further logs that are left out of its campaign, and why each is, as a sentence.
     likeness
         How alike effects look in the log; None where it is too short.
     likeness_of_all
@@ -168,6 +170,7 @@ class Diagnosis:
     path: str = ""
     profile: str = ""
     copies: tuple[tuple[str, str], ...] = ()
+    unused: tuple[tuple[str, str], ...] = ()
     likeness: Likeness | None = None
     likeness_of_all: Likeness | None = None
     repairs: tuple[str, ...] = ()
@@ -238,6 +241,7 @@ def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
         **({"second_sources": diagnosis.sources.to_json()} if diagnosis.sources else {}),
         **({} if diagnosis.learned is None else {"learned": diagnosis.learned.to_json()}),
         **({"copies": copies} if (copies := copies_as_json([diagnosis])) else {}),
+        **({"logs_left_out": unused} if (unused := unused_as_json([diagnosis])) else {}),
     }
 
 
@@ -306,6 +310,12 @@ def copies_as_json(diagnoses: Sequence[Diagnosis]) -> list[dict[str, str]]:
     """Return the logs of a campaign that are left out since they hold the motion of another, each once."""
     pairs = dict.fromkeys(pair for one in diagnoses for pair in one.copies)
     return [{"log": path, "of": other} for path, other in pairs]
+
+
+def unused_as_json(diagnoses: Sequence[Diagnosis]) -> list[dict[str, str]]:
+    """Return the other logs that are left out of a campaign, each once, and why."""
+    pairs = dict.fromkeys(pair for one in diagnoses for pair in one.unused)
+    return [{"log": path, "says": why} for path, why in pairs]
 
 
 def _over_time(course: MeasuredCourse) -> dict[str, Any]:

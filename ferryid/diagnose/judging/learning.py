@@ -23,7 +23,6 @@ from ferryid.identify import (
     fit_remainder,
     prediction_errors,
     read_logs,
-    usable_logs,
     with_remainder,
 )
 from ferryid.models import ForceScores, Model, ModelScores, StoredEffect, blank_model
@@ -125,6 +124,8 @@ class Learner:
         Folder of the ingested tables, and progress.
     settings
         How to fit: as ``ferryid fit`` does without options.
+    usable
+        The logs as they were read, where some are left out; else all of `paths` are read.
     """
 
     paths: tuple[str, ...]
@@ -132,6 +133,7 @@ class Learner:
     start: Model | None
     run: RunContext
     settings: FitSettings = field(default_factory=FitSettings)
+    usable: tuple[Opened, ...] = ()
 
     def learn(self, diagnosed: Model | None, name: str, wider: Model | None = None) -> tuple[Model | None, Learned]:
         """Return the model to store, and what was learned; logs that cannot be fitted leave the model as it is.
@@ -157,7 +159,7 @@ class Learner:
         except FerryIdError as error:
             if (others := self._that_can_be_fitted()) is not None:
                 stored, learned = others.learn(diagnosed, name, wider)
-                few = len(self.paths) - len(others.paths)
+                few = len(self.paths) - len(others.usable)
                 without = f"{counted(few, 'log')} that a fit cannot use {verb(few, 'is')} no part of that."
                 return stored, replace(learned, says=f"{learned.says.removesuffix('.')}. {without}")
             # What a fit should do instead names options that a diagnosis has not.
@@ -175,11 +177,12 @@ class Learner:
 
         A diagnosis has a use for some that a fit has not, such as those of a constant thrust.
         """
+        settings = self.settings.on(self.profile)
         try:
-            logs = usable_logs(self.paths, self.profile, self.settings.on(self.profile), self.run, "correction")
+            usable = read_logs(self.paths, self.profile, settings, self.run, whole=False, usable_only=True)
         except FerryIdError:
             return None
-        return replace(self, paths=logs.paths) if logs.left_out else None
+        return replace(self, usable=tuple(usable)) if len(usable) < len(self.paths) else None
 
     def _with_hints(self, wider: Model, model: Model | None, learned: Learned) -> tuple[Model | None, Learned]:
         """Return a model with effects that are hints where it predicts better than the one without them, else that one."""
@@ -219,7 +222,7 @@ class Learner:
     @cached_property
     def _opened(self) -> list[Opened]:
         """The logs, read once for all fits."""
-        return read_logs(self.paths, self.profile, self.settings, self.run, whole=False)
+        return list(self.usable) or read_logs(self.paths, self.profile, self.settings, self.run, whole=False)
 
     @cached_property
     def _plain(self) -> _Fitted:

@@ -345,6 +345,42 @@ class JudgingThresholds:
         "least gain without any wind or current of the logs for which these are estimated beside two hulls",
         "convention: less than half, as what conditions do is noise there",
     )
+    split_evidence: float = threshold(
+        70.0,
+        "nat",
+        "least half of the squared distance of two hulls, over what logs of the parts differ by, for which they are apart",
+        "tuned on 600 parts of real campaigns of one vessel, with the next three: of 68 the held-out gain is too unsure",
+    )
+    split_surely: float = threshold(
+        60.0,
+        "nat",
+        "lower end of the 95 % interval of the held-out gain of two hulls that are apart, at least",
+        "tuned on the same: 49 at most where the hulls differ by their share",
+    )
+    split_share: float = threshold(
+        0.4,
+        "-",
+        "least distance of two hulls, over the larger of them, for which they are of two vessels",
+        "tuned on the same and on simulated logs in which a load, damping or one of two thrusters differs: 0.37 at most",
+    )
+    split_scatter: float = threshold(
+        3.3,
+        "-",
+        "least squared distance of two hulls over the greatest of a log to the others of its part, by their expectations",
+        "tuned on the same parts: 2.9 where the gain is nearly sure enough",
+    )
+    split_scattering: int = threshold(
+        3,
+        "logs",
+        "fewest logs of a part that show how logs of it scatter about their hull",
+        "derived: two scatter about a hull of both, which is in the middle",
+    )
+    split_kept: float = threshold(
+        0.75,
+        "of that evidence",
+        "least that is left of it beside a wind or current of each log",
+        "convention: a flow that explains more of it may explain all",
+    )
     usual_disagreement: float = threshold(
         2.0,
         "-",

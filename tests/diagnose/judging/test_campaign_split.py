@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from ferryid.diagnose.inference.campaign import assemble
+from ferryid.diagnose.inference.campaign_estimation import estimate_campaign
 from ferryid.diagnose.inference.campaign_logs import Member
 from ferryid.diagnose.inference.campaign_model import Campaign
 from ferryid.diagnose.judging import campaign_split
 from ferryid.diagnose.judging.campaign_evidence import Gain
-from ferryid.diagnose.judging.campaign_split import Split, find_split
+from ferryid.diagnose.judging.campaign_split import HullDistance, Split, _Logs, find_split
+from ferryid.types import Floats
+from ferryid.vessel import load_profile
 from tests.diagnose.inference.test_campaign_estimation import CALM, WINDS, campaign
 from tests.diagnose.judging.test_group_differences import groups
+from tests.diagnose.trials import averaged
 
 pytestmark = pytest.mark.slow
 
@@ -74,3 +81,120 @@ def test_a_thruster_that_weakened_between_logs_is_no_other_hull(monkeypatch: pyt
     split = find_split(whole, none)
     assert split is not None
     assert split.inside.tolist() == [False] * 4 + [True] * 2
+
+
+def mixed(factor: float) -> Campaign:
+    """Return six logs of which the second, fourth and fifth are of a vessel on which all forces are a factor larger."""
+    whole = groups((1.0, 1.0, 1.0), ("", "", ""))
+    members = [heavy(one, factor) if i in (1, 3, 4) else one for i, one in enumerate(whole.members)]
+    # Nobody has modelled the hull.
+    unknown = replace(whole.hull, known=False, spread=5.0 * whole.hull.spread)
+    return replace(whole, members=tuple(members), hull=unknown)
+
+
+def test_logs_of_two_vessels_are_told_apart_in_whatever_order() -> None:
+    split = find_split(mixed(2.5), np.zeros(6, dtype=np.bool_))
+    assert split is not None
+    assert split.inside.tolist() == [True, False, True, False, False, True]
+    assert split.apart
+    assert split.hulls.share > 0.55
+
+
+def test_logs_whose_hulls_differ_by_a_quarter_stay_together() -> None:
+    whole = mixed(1.3)
+    (alike,) = _Logs(estimate_campaign(whole)).alike()
+    assert alike.tolist() == [True, False, True, False, False, True]
+    (split,) = campaign_split._judged(estimate_campaign(whole), [alike])
+    # They are known to differ, by what a factor of all forces makes of a hull.
+    assert split.hulls.evidence > 70.0
+    assert split.hulls.share == pytest.approx(1.0 - 1.0 / 1.3, abs=0.03)
+    assert find_split(whole, np.zeros(6, dtype=np.bool_)) is None
+
+
+def test_logs_of_one_hull_are_all_alike() -> None:
+    assert _Logs(estimate_campaign(mixed(1.0))).alike() == []
+
+
+@pytest.mark.parametrize(
+    ("gain", "low", "hulls", "apart"),
+    [
+        (160.0, 70.0, (90.0, 4.0, 0.6), True),
+        (79.0, 70.0, (90.0, 4.0, 0.6), False),
+        (160.0, 50.0, (90.0, 4.0, 0.6), False),
+        (160.0, 70.0, (66.0, 4.0, 0.6), False),
+        (160.0, 70.0, (90.0, 2.9, 0.6), False),
+        (160.0, 70.0, (90.0, 4.0, 0.37), False),
+    ],
+)
+def test_hulls_are_apart_where_all_figures_say_so(
+    gain: float, low: float, hulls: tuple[float, float, float], apart: bool
+) -> None:
+    split = Split(np.array([True, False]), Gain(gain, low, 2.0 * gain), 1.2, HullDistance(*hulls))
+    assert split.apart == apart
+
+
+def test_hulls_that_a_wind_explains_are_not_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = campaign()
+    inside = np.array([False, False, True])
+    bare = Split(inside, Gain(160.0, 70.0, 250.0), 1.2, HullDistance(90.0, 4.0, 0.6))
+    for evidence, found in ((60.0, True), (50.0, False)):
+        told = iter([bare, Split(inside, Gain(20.0, -50.0, 90.0), 1.1, HullDistance(evidence, 2.0, 0.6))])
+        monkeypatch.setattr(campaign_split, "_judged", lambda made, ways, told=told: [next(told)])
+        assert (find_split(whole, NONE) is not None) == found
+
+
+COLUMNS = {
+    "t [s]": "t",
+    "x_position_mid [m]": "x",
+    "u_velo [m/s]": "u",
+    "y_position_mid [m]": "y",
+    "vm_velo [m/s]": "v",
+    "psi_hat [rad]": "psi",
+    "r_angvelo [rad/s]": "r",
+    "n_prop [rps]": "n",
+    "delta_rudder [rad]": "rudder",
+    "wind_velo_relative_mid [m/s]": "air",
+    "wind_dir_relative_mid [rad]": "air_from",
+}
+"""Columns of Esso Osaka's logs."""
+
+
+def renamed(tanker: Path, path: Path) -> str:
+    """Write a log of the KVLCC2's model in the columns, units and axes of Esso Osaka's, in still air, and return its path."""
+    t, x, y, psi, u, v, r, _, rudder, n = np.loadtxt(tanker, skiprows=4, encoding="cp1252").T[:10]
+    heading = np.deg2rad(psi)
+    ahead, aside = np.cos(heading) * u + np.sin(heading) * v, np.cos(heading) * v - np.sin(heading) * u
+    every: dict[str, Floats] = {
+        "t": t,
+        "x": x,
+        "y": y,
+        "psi": heading,
+        "u": ahead,
+        "v": aside,
+        "r": np.deg2rad(r),
+        "n": n,
+    }
+    every |= {"rudder": -np.deg2rad(rudder), "air": np.hypot(u, v), "air_from": np.arctan2(aside, ahead)}
+    rows = np.column_stack([every[name] for name in COLUMNS.values()])[::2]
+    np.savetxt(path, rows, delimiter=",", header=",".join(COLUMNS), comments="")
+    return str(path)
+
+
+def test_logs_of_another_tanker_are_found_among_recorded_ones(
+    shared_data: Callable[[str], Path], tmp_path: Path
+) -> None:
+    """Much of the force error of the pond's logs is noise, so that one hull for both leaves hardly more of it."""
+    profile = load_profile("esso-osaka")
+    own = [str(one) for one in sorted(shared_data("esso_osaka/random").glob("*.csv"))]
+    foreign = [renamed(one, tmp_path / f"{one.stem}.csv") for one in sorted(shared_data("kvlcc2").glob("*.dat"))[:3]]
+    for paths in ([*own[:8], foreign[0]], [own[0], foreign[0], own[1], foreign[1], own[2], foreign[2], own[3]], own):
+        assembled = assemble(averaged(paths, profile), profile)
+        assert assembled is not None
+        found, place = assembled
+        split = find_split(found, np.zeros(len(paths), dtype=np.bool_))
+        if paths == own:
+            assert split is None
+            continue
+        assert split is not None
+        assert split.ratio < 2.5
+        assert {path for path in paths if split.inside[place[path]]} == set(paths) & set(foreign)
