@@ -198,6 +198,8 @@ def excerpt(steps: Windows) -> Windows:
 
 def _widths(cost: Callable[[Floats], float], z: Floats, k: int, best: float) -> Floats:
     """Return standard deviations of the last k of the parameters, with the rest as they are; infinite where a cost is flat."""
+    if k == 0:
+        return np.empty(0)
     d = 0.05
     moves = np.eye(len(z))[len(z) - k :] * d
     bend = np.empty((k, k))

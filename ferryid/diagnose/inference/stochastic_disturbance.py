@@ -58,6 +58,9 @@ class DisturbanceState:
         True where it was found in the velocities, and positions hardly show it.
     gain_in_velocities
         Evidence for it in the velocities [nat]; infinite where these say nothing.
+    loss_in_velocities
+        Log-likelihood that velocities lose with the least of it that a force would show in them, `INFERENCE.least_shown` of its
+        power, beside their own noise [nat]; 0 where these say nothing, or speak for it.
     """
 
     candidate: Candidate
@@ -68,6 +71,7 @@ class DisturbanceState:
     times: Mapping[str, Estimate] = field(default_factory=dict)
     in_velocities: bool = False
     gain_in_velocities: float = inf
+    loss_in_velocities: float = 0.0
 
     @property
     def known(self) -> frozenset[str]:
@@ -131,22 +135,23 @@ def fit_disturbances(
     before = {one.candidate.key: one for one in seen}
     spans = _spans(steps, made)
     noise, states = _selected(steps, gaps, noise, candidates, force_model, minimum_gain, before, spans, closely=known)
-    velocities = _velocity_steps(problem) if known else None
     narrow = [one for one in candidates if any(parameter.unit == "Hz" for parameter in one.parameters)]
+    # What is broad is in the noise of any velocity, and shows by its power alone.
+    found = {state.candidate.key for state in states}
+    asked = found & {one.key for one in narrow}
     # Small ones wait for what explains more.
     last = minimum_gain <= INFERENCE.disturbance_gain
-    if velocities is not None and narrow and (states or last):
-        found = {state.candidate.key for state in states}
+    velocities = _velocity_steps(problem) if asked or (known and narrow and last) else None
+    if velocities is not None:
         theirs = velocities.gap(force_model)
         alone = fit_noise(velocities, theirs)
-        # What is broad is in the noise of any velocity, and shows by its power alone.
-        keys = {one.key for one in narrow}
         states = [
-            replace(state, gain_in_velocities=_shown(velocities, theirs, alone, state, force_model))
-            if state.candidate.key in keys
+            _in_velocities(velocities, theirs, alone, state, force_model, known=known)
+            if state.candidate.key in asked
             else state
             for state in states
         ]
+    if velocities is not None and known:
         missing = [one for one in narrow if last and one.key not in found]
         before = {one.candidate.key: one for one in initial if one.in_velocities}
         more = _selected(velocities, theirs, alone, missing, force_model, minimum_gain, before, spans, closely=True)[1]
@@ -359,6 +364,33 @@ def _velocity_steps(problem: EstimationProblem) -> Windows | None:
     if not windows.channels[0] or not np.isfinite(windows.measurements.nu_raw[windows.measurements.usable]).all():
         return None
     return excerpt(steps_of(replace(windows, channels=~windows.channels)))
+
+
+def _in_velocities(
+    steps: Windows, gaps: Floats, alone: NoiseModel, state: DisturbanceState, force_model: ForceModel, *, known: bool
+) -> DisturbanceState:
+    """Return a disturbance that positions show with what velocities say for it, beside a known hull, and against it."""
+    if known:
+        gain = _shown(steps, gaps, alone, state, force_model)
+        state = replace(state, gain_in_velocities=gain)
+        if gain > INFERENCE.prior_odds:
+            return state
+    return replace(state, loss_in_velocities=_loss(steps, gaps, alone, state, force_model))
+
+
+def _loss(steps: Windows, gaps: Floats, alone: NoiseModel, state: DisturbanceState, force_model: ForceModel) -> float:
+    """Return how much less likely velocities are with the least of a disturbance that a force would show in them [nat].
+
+    Their own noise gives way to it, so that a velocity in whose noise it would not be seen loses nothing.
+    """
+    assert state.candidate.effect.unsteady is not None
+    strength = _strengths(state.candidate)
+    # Nothing is claimed on an axis on which it is not known how strong it is.
+    claimed = np.where(state.widths < INFERENCE.vague_log, INFERENCE.least_shown**0.5, 0.0)
+    values = state.values * np.where(strength, claimed, 1.0)
+    processes = acting(state.candidate.effect.unsteady(force_model), state.course, force_model)(values)
+    _, _, _, after = fit_noise_with(steps, gaps, alone, lambda _: processes, np.empty(0), force_model)
+    return likelihood(alone, steps, gaps) - after
 
 
 def _shown(steps: Windows, gaps: Floats, alone: NoiseModel, state: DisturbanceState, force_model: ForceModel) -> float:

@@ -113,6 +113,12 @@ class InferenceThresholds:
         "shortest memory of a disturbance in a narrow band",
         "convention: a damping ratio of a third; that of waves is about 0.1",
     )
+    least_shown: float = threshold(
+        0.3,
+        "of the power",
+        "share of a disturbance's power that velocities must not exclude, or it is an error of the positions",
+        "convention: as `power_in_velocities`, less than a half, as a navigation filter smooths",
+    )
     widest_log: float = threshold(
         9.0,
         "-",

@@ -56,6 +56,8 @@ class Figures:
         Share of a disturbance's power that the velocities show, about its peak.
     gain, gain_in_velocities
         Evidence for a disturbance, and in the velocities alone [nat].
+    loss_in_velocities
+        Log-likelihood that the velocities lose with the least of it that a force would show in them [nat].
     explained_by
         Id of another effect that the log shows, beside which nothing is left of a disturbance; empty where there is none.
     seen_twice
@@ -87,6 +89,7 @@ class Figures:
     power_in_velocities: float = inf
     gain: float = inf
     gain_in_velocities: float = inf
+    loss_in_velocities: float = 0.0
     explained_by: str = ""
     seen_twice: bool = True
     other_logs: OtherLogs | None = None

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from math import inf
+from math import inf, pi
 
 from ferryid.counts import counted
 from ferryid.diagnose.inference.thresholds import INFERENCE
@@ -131,14 +131,37 @@ def absent_in_velocities(finding: Finding, context: Context, threshold: float) -
     """Lower a disturbance of whose power the velocities show less, or none: errors of positions look like a force, too.
 
     They show it by as much evidence as any effect needs. Where that is more than the positions' own, a navigation that smooths
-    may hide its power.
+    may hide its power. It is dropped where velocities show less and exclude by as much evidence that there is more of it in
+    them than their noise hides: noise of a sensor is no force. A velocity that lags may be one that was smoothed.
     """
     own = context.own
     powerful = own.power_in_velocities >= threshold or own.gain < own.gain_in_velocities < inf
     if powerful and own.gain_in_velocities > INFERENCE.prior_odds:
         return finding, ""
+    passed = _passed_by_lag(finding, context.beside)
+    if not powerful and own.loss_in_velocities > INFERENCE.prior_odds and passed >= threshold:
+        return None, _error_of_pose(finding)
     says = f"{finding.says} The velocities do not show it: it may be an error of the positions."
     return lowered(replace(finding, says=says)), ""
+
+
+def _passed_by_lag(finding: Finding, beside: Sequence[Claim]) -> float:
+    """Return the share of a disturbance's power that a first-order filter passes which lags as the velocity was found to."""
+    peak = finding.parameters.get("peak_frequency")
+    lags = [-one.finding.parameters["seconds"].value for one in beside if one.finding.effect == "clock_offset"]
+    lag_s = max([0.0, *lags])
+    return 1.0 if peak is None else 1.0 / (1.0 + (2.0 * pi * peak.value * lag_s) ** 2)
+
+
+def _error_of_pose(finding: Finding) -> str:
+    """Return that a disturbance in a narrow band is an error of the sensor of the pose, as a sentence."""
+    turns = finding.axes.get("yaw", 0.0) >= max(finding.axes.values())
+    pose, rate = ("heading", "yaw rate excludes") if turns else ("position", "velocity excludes")
+    peak = finding.parameters.get("peak_frequency")
+    at = "" if peak is None else f" at {peak.value:.2g} Hz"
+    return (
+        f"In the {pose} something comes and goes{at} that the {rate}, so that it is noise of the {pose}, and no force."
+    )
 
 
 @rule()

@@ -167,6 +167,7 @@ def _claim(
             power_in_velocities=power_in_velocities,
             gain=state.gain,
             gain_in_velocities=state.gain_in_velocities,
+            loss_in_velocities=state.loss_in_velocities,
             seen_twice=measurements.seen_twice(int(np.argmax(power))),
             cycles=_cycles(state, pushes),
             doubt=doubt,

@@ -18,6 +18,7 @@ from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, 
 from ferryid.diagnose.inference.noise_model import stride_s
 from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.diagnose.inference.stochastic_disturbance import DisturbanceState, fit_disturbances
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.disturbance_findings import disturbance_claims
 from ferryid.effects import effects
@@ -159,8 +160,18 @@ def test_what_positions_alone_show_is_told_by_the_velocities(calm: EstimationPro
     swing = 0.01 * narrow_band(measurements.t, measurements.step_s)[:, None] * [0.0, 0.0, 1.0]
     seen = windows(replace(measurements, eta=measurements.eta + swing), *window_lengths(FERRY))
     odd = estimation_problem(seen, *prior_force_model(seen.measurements, FERRY))
-    assert max(one.gain_in_velocities for one in waves_in(odd)[1]) < 0.0
-    assert waves_in(shaken(calm, 150.0))[1][0].gain_in_velocities > 100.0
+    (swung,) = waves_in(odd)[1]
+    assert swung.gain_in_velocities < 0.0
+    assert swung.loss_in_velocities > 100.0
+    (waves,) = waves_in(shaken(calm, 150.0))[1]
+    assert waves.gain_in_velocities > 100.0
+    assert waves.loss_in_velocities == 0.0
+    # Velocities in whose noise the swing would not be seen exclude nothing.
+    rough = 2.0 * np.random.default_rng(8).standard_normal((len(measurements.t), 3))
+    noisy = replace(measurements, eta=measurements.eta + swing, nu_raw=measurements.nu_raw + rough)
+    seen = windows(noisy, *window_lengths(FERRY))
+    hidden = estimation_problem(seen, *prior_force_model(seen.measurements, FERRY))
+    assert all(one.loss_in_velocities < INFERENCE.prior_odds for one in waves_in(hidden)[1])
 
 
 @pytest.mark.slow

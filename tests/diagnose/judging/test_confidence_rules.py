@@ -118,6 +118,38 @@ def test_a_disturbance_that_the_velocities_lack_is_a_hint() -> None:
     assert not judged.sure
 
 
+def test_a_disturbance_that_the_velocities_exclude_is_noise_of_the_pose() -> None:
+    odds, weak = INFERENCE.prior_odds, nextafter(0.3, 0.0)
+    turning = replace(
+        found("waves"),
+        parameters={"peak_frequency": Estimate(0.4, 0.3, 0.5, "Hz")},
+        axes={"surge": 0.0, "sway": 0.2, "yaw": 0.8},
+    )
+    excluded = on("disturbance", power_in_velocities=weak, loss_in_velocities=nextafter(odds, inf))
+    assert absent_in_velocities(turning, excluded) == (
+        None,
+        "In the heading something comes and goes at 0.4 Hz that the yaw rate excludes, so that it is noise of the heading, "
+        "and no force.",
+    )
+    shoved = replace(turning, parameters={}, axes={"surge": 0.9, "sway": 0.1, "yaw": 0.0})
+    assert absent_in_velocities(shoved, excluded)[1].startswith(
+        "In the position something comes and goes that the velocity"
+    )
+    # A velocity that lags by so much may have lost it in its filter; one that is early has not.
+    for seconds, hint in ((-0.8, True), (-0.1, False), (0.8, False)):
+        late = replace(found("clock_offset"), parameters={"seconds": Estimate(seconds, seconds, seconds, "s")})
+        beside = replace(excluded, beside=(Claim(late, Figures("sensor")),))
+        assert (absent_in_velocities(turning, beside)[0] is not None) == hint
+    # A velocity in whose noise it would not be seen, or that shows as much, excludes nothing.
+    for power, loss in ((weak, odds), (0.3, nextafter(odds, inf))):
+        judged, _ = absent_in_velocities(
+            turning,
+            on("disturbance", power_in_velocities=power, gain_in_velocities=0.0, loss_in_velocities=loss),
+        )
+        assert judged is not None
+        assert not judged.sure
+
+
 def test_a_disturbance_for_which_velocities_speak_more_than_positions_is_in_both() -> None:
     weak = nextafter(0.3, 0.0)
     shown = on("disturbance", power_in_velocities=weak, gain=1600.0, gain_in_velocities=2400.0)
