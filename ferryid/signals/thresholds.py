@@ -177,10 +177,11 @@ class SignalThresholds:
         "convention: sixty bags of 20 s; wind and current are constant over a log",
     )
     break_s: float = threshold(
-        30.0,
+        5.0,
         "s",
         "longest break between such logs, by clocks that were set",
-        "convention: a recorder begins its next file, or is started again by hand, and weather and load stay as they are",
+        "convention: a recorder begins its next file; one that is started again by hand, 35 s later and more in a campaign on "
+        "a lake, begins another run",
     )
     break_samples: float = threshold(
         2.0,
