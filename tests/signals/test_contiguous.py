@@ -57,7 +57,7 @@ def test_a_recorder_that_is_restarted_makes_one_log_and_a_pause_two(tmp_path: Pa
     found = contiguous(paths, SHIP)
     assert len(found.paths) == logs
     (note,) = found.notes
-    assert ("follow each other after breaks of up to 15 s were" in note) == (logs == 1)
+    assert ("follow each other after breaks of up to 2.6 s were" in note) == (logs == 1)
     assert ("follow each other without a break were" in note) == (logs == 2)
 
 
