@@ -442,6 +442,12 @@ def parts_of(log: str) -> list[str]:
     return [log] if exists(log) else log.split("+")
 
 
+def name_of_log(log: str) -> str:
+    """Return the name of the file of a log; of parts that ``+`` joins that of the first, and how many more there are."""
+    first, *more = parts_of(log)
+    return f"{Path(first).name} and {len(more)} more" if more else Path(first).name
+
+
 def existing_parts(text: str) -> list[Path]:
     """Split a joined path at those ``+`` that leave paths which all exist (a folder's name may hold one too)."""
     pieces = text.split("+")

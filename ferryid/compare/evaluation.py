@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from ferryid.identify import check_window
 from ferryid.models import RANGE_UNITS, ForceScores, Model, StoredEffect, force_scores, outside_ranges, usable_rows
 from ferryid.models.forces import Estimator, effective_mass, without_inputs
 from ferryid.models.prediction import Prediction, predict, predict_base, signal_map, window_errors, window_scores
-from ferryid.signals.copies import GivenLogs
+from ferryid.signals.copies import GivenLogs, has_marks
 from ferryid.signals.prepare import Prepared, prepare
 from ferryid.signals.stream import Recording
 from ferryid.signals.track import Motion
@@ -245,8 +245,22 @@ def range_warnings(model: Model, motion: Motion, rows: Flags) -> list[str]:
     return warnings
 
 
+def _parts_of_one(recording: Recording, model: Model) -> Iterator[str]:
+    """Yield a sentence where a log is a part of one whose conditions the model knows: by itself it has none of these."""
+    if model.conditions_of(recording.sha256):
+        return
+    for log in model.training:
+        several = len(log["files"]) > 1 and "motion" in log and model.conditions_of(str(log["sha256"]))
+        if several and has_marks(recording, [log["motion"]]):
+            yield (
+                f"it is a part of {log['name']}, in which its parts were diagnosed as one: what acted there is not in these "
+                "figures. Fix: give all of its parts as one log, joined by +"
+            )
+
+
 def _warnings(recording: Recording, model: Model, motion: Motion, rows: Flags) -> list[str]:
     warnings = range_warnings(model, motion, rows)
     if trained_on(model, recording):
         warnings.append("the model was trained on this log: its scores here are no evidence")
+        warnings += _parts_of_one(recording, model)
     return warnings

@@ -19,7 +19,7 @@ from ferryid.diagnose.judging.campaign_split import Split, find_split
 from ferryid.diagnose.judging.diagnosis import distinct
 from ferryid.effects.wording import listed
 from ferryid.errors import FerryIdError
-from ferryid.files import resolved
+from ferryid.files import name_of_log, resolved
 from ferryid.identify.engagement import unanswered_force, unengaged
 from ferryid.models import Model
 from ferryid.side_by_side import over
@@ -198,8 +198,8 @@ def _resolved(path: str) -> tuple[str, ...]:
 def _copied(path: str, other: str, whose: str) -> str:
     """Return that a log is another's copy and no evidence of its own, as a sentence."""
     return (
-        f"Left out of the {whose}: {path}: it holds the motion of {Path(other).name}, as the same recording does under another "
-        "name or in another format: it is no further evidence, and no estimate has it twice"
+        f"Left out of the {whose}: {path}: it holds the motion of {name_of_log(other)}, as the same recording does under "
+        "another name or in another format: it is no further evidence, and no estimate has it twice"
     )
 
 
@@ -258,7 +258,7 @@ def _unset(paths: Sequence[str]) -> tuple[str, ...]:
     if not paths:
         return ()
     return (
-        f"The clock was not set in {listed([Path(one).name for one in paths])}, whose times are before the year 2000: when "
+        f"The clock was not set in {listed([name_of_log(one) for one in paths])}, whose times are before the year 2000: when "
         "they were recorded is not known, all logs are taken in the order in which they were given, and these are taken to be "
         "near no other in time.",
     )
@@ -274,7 +274,7 @@ def _overlapping(logs: Sequence[AveragedLog]) -> tuple[str, ...]:
         for start, other_end, other in spans[k + 1 :]:
             if start < end and path != other:
                 seconds = (min(end, other_end) - start) * 1e-9
-                overlapping.append(f"{Path(path).name} and {Path(other).name} by {seconds:.0f} s")
+                overlapping.append(f"{name_of_log(path)} and {name_of_log(other)} by {seconds:.0f} s")
     if not overlapping:
         return ()
     more = len(overlapping) - SHOWN_OVERLAPS
@@ -381,7 +381,7 @@ def _why(split: Split) -> str:
 
 def _names(group: Group, paths: Collection[str]) -> str:
     every = [one.path for one in (*group.logs, *group.references)]
-    names = distinct([Path(one).name for one in every], every)
+    names = distinct([name_of_log(one) for one in every], every)
     return listed([name for name, path in zip(names, every, strict=True) if path in paths])
 
 

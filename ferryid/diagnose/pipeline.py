@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import PurePath
 
 from ferryid.diagnose.gathering import (
     CAMPAIGN,
@@ -34,7 +33,7 @@ from ferryid.diagnose.judging.model_update import store_updated_model
 from ferryid.diagnose.second_sources import compare_second_sources
 from ferryid.effects.wording import listed
 from ferryid.errors import FerryIdError, did_you_mean
-from ferryid.files import parts_of, resolved
+from ferryid.files import name_of_log, parts_of, resolved
 from ferryid.freed import give_back
 from ferryid.models import Model
 from ferryid.models.store import check_name
@@ -208,7 +207,7 @@ def _brought(group: Group, together: JudgedCampaign | None) -> tuple[str, ...]:
     """Return what the references of a group are for, as a sentence."""
     if not group.references:
         return ()
-    names = listed([PurePath(one.path).name for one in group.references])
+    names = listed([name_of_log(one.path) for one in group.references])
     if together is None:
         return (f"The references {names} do not bring the hull: they are too short. Fix: give longer ones, or more",)
     return (

@@ -214,6 +214,8 @@ class Effect:
     doubt
         ``doubt(values, profile)`` returns why values by name are not credible of a vessel, or may stand in for something else,
         whatever the data say, as the end of a sentence; empty where they are as they may be.
+    doubt_where
+        ``doubt_where(values, measurements)`` does so by where the vessel was in a log.
     doubt_of_ends
         ``doubt_of_ends(ends)`` does so by the lower and upper ends of 95 % intervals by name, where a value may be chance.
     later
@@ -274,6 +276,7 @@ class Effect:
     sidewise: tuple[str, ...] = ()
     unsteady: Callable[[ForceModel], Processes] | None = None
     doubt: Callable[[Values, Profile], str] = lambda values, profile: ""
+    doubt_where: Callable[[Values, Measurements], str] = lambda values, measurements: ""
     doubt_of_ends: Callable[[Mapping[str, tuple[float, float]]], str] = lambda ends: ""
     later: tuple[str, ...] = ()
     scales: bool = False

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, sin
+from math import cos, inf, sin
 from typing import Any
 
 import numpy as np
@@ -54,6 +54,24 @@ def cannot(measurements: Measurements) -> str:
     return "" if np.isfinite(measurements.eta[measurements.usable, :2]).all() else "the log has no position"
 
 
+def doubt_where(values: Values, measurements: Measurements) -> str:
+    """Return that the pull hardly changed with the place, which is what holds like a spring, as the end of a sentence."""
+    t = measurements.t
+    rows = measurements.usable & (t >= values.get("onset", -inf)) & (t <= values.get("offset", inf))
+    away = measurements.eta[rows, :2] - [values.get("north", 0.0), values.get("east", 0.0)]
+    pull = away * [values.get("stiffness_north", 0.0), values.get("stiffness_east", 0.0)]
+    if not len(pull):
+        return ""
+    mean = float(np.hypot(*pull.mean(axis=0)))
+    change = float(np.sqrt(pull.var(axis=0).sum()))
+    if change >= EFFECTS.least_pull_change * mean:
+        return ""
+    return (
+        f"its pull is {mean:.0f} N on average and changes by {change:.0f} N where the vessel was: a wind, a current and the "
+        "drift of waves push like that, too"
+    )
+
+
 def says(values: Values, instance: str | None) -> str:
     """Return the finding as a sentence."""
     return (
@@ -92,6 +110,7 @@ EFFECT = Effect(
     says,
     scenario,
     cannot=cannot,
+    doubt_where=doubt_where,
     onset=True,
     regressor=regressor,
     formula_error=EFFECTS.load_error,

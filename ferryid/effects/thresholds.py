@@ -174,6 +174,12 @@ class EffectThresholds:
         "lowest frequency of waves",
         "convention: deep-water waves of a quarter of the frequency are sixteen times as long, and slower is no sea",
     )
+    least_pull_change: float = threshold(
+        0.5,
+        "of the mean pull",
+        "least standard deviation, over the places where the vessel was, of the pull of a mooring",
+        "convention: half; what pulls nearly alike everywhere is a constant force as well as a line",
+    )
     least_coherence: float = threshold(
         1.0,
         "periods",

@@ -12,6 +12,7 @@ from ferryid.diagnose import JUDGING, UNKNOWN, Diagnosis, Estimate, Finding, wor
 from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.effects.wording import IS_A_HINT, listed, parameter_word, timed, titled, uncapitalised
+from ferryid.files import name_of_log
 from ferryid.report import least_sizes
 from ferryid.report.diagnosis_errors import fitted, ratio_of
 from ferryid.report.evaluation_text import NOT_ACCEPTED
@@ -446,7 +447,7 @@ def copies(diagnoses: Sequence[Diagnosis]) -> str:
     found = dict.fromkeys(pair for one in diagnoses for pair in one.copies)
     if not found:
         return ""
-    told = listed([f"{PurePath(path).name} (of {PurePath(other).name})" for path, other in found])
+    told = listed([f"{name_of_log(path)} (of {name_of_log(other)})" for path, other in found])
     are = "log is a copy and" if len(found) == 1 else "logs are copies and"
     return f"{len(found)} further {are} left out of the estimate: {told}."
 
@@ -456,7 +457,7 @@ def unused(diagnoses: Sequence[Diagnosis]) -> str:
     found = list(dict.fromkeys(path for one in diagnoses for path, _ in one.unused))
     if not found:
         return ""
-    names = [PurePath(path).name for path in found[:SHOWN_UNUSED]]
+    names = [name_of_log(path) for path in found[:SHOWN_UNUSED]]
     more = len(found) - len(names)
     names += [f"{more} more"] if more else []
     return (

@@ -117,14 +117,15 @@ class _Span:
     def seconds(self) -> float:
         return (self.end_ns - self.start_ns) * 1e-9
 
-    def precedes(self, other: _Span, profile: Profile) -> bool:
-        """Return whether another log goes on when this one ends, with the same topics."""
+    def precedes(self, other: _Span, profile: Profile, *, alone: bool) -> bool:
+        """Return whether another log goes on when this one ends, with the same topics; `alone` where no log was made beside."""
         shared = [(topic, other.topics[name]) for name, topic in self.topics.items() if name in other.topics]
         if not shared or any(one.type != two.type or two.start_ns < one.end_ns for one, two in shared):
             return False
         break_s = (other.start_ns - self.end_ns) * 1e-9
         if dated(self.start_ns):
-            return break_s <= SIGNALS.break_s
+            # Two recorders may have begun their files together.
+            return break_s <= SIGNALS.break_s and (alone or _goes_on(self.path, other.path, profile))
         # Times that are no dates may follow each other by chance: no sample may be missing, nor the vessel be elsewhere.
         return break_s <= min(SIGNALS.break_s, SIGNALS.break_samples * self.sample_s) and _goes_on(
             self.path, other.path, profile
@@ -197,9 +198,10 @@ def _span(path: str, profile: Profile, mapped: set[str]) -> _Span | None:
 def _runs(spans: Sequence[_Span], profile: Profile) -> list[list[_Span]]:
     """Return logs in order of time in runs of which each log precedes the next."""
     runs = list[list[_Span]]()
+    alone = not any(two.start_ns < one.start_ns + (one.end_ns - one.start_ns) // 2 for one, two in pairwise(spans))
     for one in spans:
         # A copy beside a bag begins with it and follows the same one: it stays by itself.
-        run = next((run for run in runs if run[-1].precedes(one, profile)), None)
+        run = next((run for run in runs if run[-1].precedes(one, profile, alone=alone)), None)
         if run is None:
             runs.append([one])
         else:

@@ -135,6 +135,23 @@ def test_without_a_curve_a_wake_is_weighed_by_the_most_of_the_log() -> None:
     np.testing.assert_allclose(after.parts[:, 1, 0], [20.0 * (1.0 - 0.4 * 0.5), 20.0 * 0.6], rtol=1e-12)
 
 
+@pytest.mark.parametrize(("away_m", "doubted"), [(10.0, False), (80.0, True)])
+def test_a_mooring_that_pulls_alike_everywhere_may_be_a_constant_force(away_m: float, doubted: bool) -> None:
+    turns = np.linspace(0.0, 4.0 * np.pi, 200)
+    eta = np.column_stack([15.0 * np.cos(turns), 15.0 * np.sin(turns), turns])
+    rest = np.zeros((200, 3))
+    seen = Measurements(
+        FERRY, turns, eta, rest, rest, np.zeros((200, 2, 3)), np.zeros((200, 2)), np.ones(200, dtype=np.bool_)
+    )
+    values = {"stiffness_north": 2.0, "stiffness_east": 2.0, "north": away_m, "east": 0.0}
+    said = effects()["mooring"].doubt_where(values, seen)
+    # The standard deviation over a circle is its radius, of the pull twice as much.
+    assert said == (
+        "its pull is 160 N on average and changes by 30 N where the vessel was: a wind, a current and the drift of waves "
+        "push like that, too" if doubted else ""
+    )  # fmt: skip
+
+
 def test_a_mooring_pulls_to_its_place_whatever_the_heading() -> None:
     heading = radians(30.0)
     before = pushed([(0.0, 0.0), (0.0, 0.0)], (0.0, 0.0, 0.0), heading)

@@ -103,6 +103,15 @@ def test_an_hour_of_bags_becomes_logs_of_even_length(tmp_path: Path) -> None:
     assert [path for parts in found.parts.values() for path in (one.path for one in parts)] == paths
 
 
+@pytest.mark.parametrize("order", [(0, 1, 2, 3, 4, 5), (3, 1, 5, 0, 4, 2), (0, 4, 2, 3, 1, 5)])
+def test_two_recordings_that_were_begun_at_once_are_not_mixed(tmp_path: Path, order: tuple[int, ...]) -> None:
+    begins = [0.0, 20.0, 40.0]
+    first = bags(tmp_path, begins)
+    second = [bag(tmp_path, f"other{k}", EPOCH_S + begin, 20.0, shift=3.0) for k, begin in enumerate(begins)]
+    every = [*first, *second]
+    assert set(contiguous([every[k] for k in order], SHIP).paths) == {"+".join(first), "+".join(second)}
+
+
 def test_a_copy_beside_the_bags_is_joined_with_copies_alone(tmp_path: Path) -> None:
     (tmp_path / "again").mkdir()
     paths, copies = (bags(folder, [0.0, 20.0]) for folder in (tmp_path, tmp_path / "again"))

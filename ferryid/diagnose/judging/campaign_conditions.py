@@ -14,7 +14,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import exp
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -50,6 +49,7 @@ from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
 from ferryid.effects.effect import Parameter
 from ferryid.effects.wording import listed, weak_evidence
+from ferryid.files import name_of_log
 from ferryid.types import AXES, Floats
 from ferryid.vessel.circumstances import Circumstances
 
@@ -512,7 +512,7 @@ def _where_worse(test: ConditionTest, place: Mapping[str, int]) -> str:
     gains = loss.gain(test.loss[0])
     worst = min(place, key=lambda path: float(gains[loss.log == place[path]].sum()))
     lost = float(gains[loss.log == place[worst]].sum())
-    return f" Those stretches are predicted worse with it, most in {Path(worst).name} ({lost:+.0f} nat)."
+    return f" Those stretches are predicted worse with it, most in {name_of_log(worst)} ({lost:+.0f} nat)."
 
 
 def _range(gain: Gain) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.group_differences import judged_difference
 from ferryid.effects.payload import whereabouts
 from ferryid.effects.wording import ALL_THRUSTERS
+from ferryid.files import name_of_log
 from ferryid.types import AXES
 
 
@@ -119,7 +119,7 @@ def judge_change(made: CampaignFit, place: Mapping[str, int]) -> ChangeTest | No
     if change is None:
         return None
     paths = {i: path for path, i in place.items()}
-    last, first = (Path(paths[i]).name for i in made.campaign.order[change.count - 1 : change.count + 1])
+    last, first = (name_of_log(paths[i]) for i in made.campaign.order[change.count - 1 : change.count + 1])
     return _tested(change, (last, first))
 
 

@@ -40,6 +40,8 @@ from ferryid.diagnose.judging.likeness import likeness_of_logs
 from ferryid.diagnose.judging.locate import locate, locate_between
 from ferryid.diagnose.judging.posterior import Posterior, posterior_of
 from ferryid.diagnose.judging.verdict import Remainder, verdict_of
+from ferryid.effects import effects
+from ferryid.effects.wording import listed, uncapitalised
 from ferryid.signals.time_ranges import ranges_of
 from ferryid.types import AXES, Floats
 from ferryid.vessel import given_as
@@ -213,6 +215,7 @@ def _concluded(
     notes = (
         *survey_notes(screened),
         *remedies(screened, findings),
+        *drift_of_waves(findings),
         *estimated.expectation.notes,
         *noted,
         *stands.dropped,
@@ -304,6 +307,22 @@ def order_remedies(profile: Profile, findings: Sequence[Finding]) -> tuple[str, 
         "The actuators are known by their orders alone, which they may follow late; a late navigation looks alike. ferryid fit "
         "estimates time_constant_s and delay_s of these orders where a log shows them, and prints the lines of the profile "
         "that state them for every command.",
+    )
+
+
+def drift_of_waves(findings: Sequence[Finding]) -> tuple[str, ...]:
+    """Return that a sure steady load beside sure waves may hold some of their drift, which no effect has.
+
+    Their mean force is of second order in their height (Faltinsen 1990, Sea loads on ships and offshore structures, chapter 5).
+    """
+    known = effects()
+    sure = [known[one.effect] for one in findings if one.sure and one.effect in known]
+    steady = list(dict.fromkeys(uncapitalised(one.title) for one in sure if one.of_log))
+    if not steady or not any(one.id == "waves" for one in sure):
+        return ()
+    return (
+        f"Waves push on average as well, mostly the way they run (drift, of second order in their height): the "
+        f"{listed(steady)} that was found beside them may hold some of it.",
     )
 
 

@@ -178,7 +178,8 @@ def _figures(
         block_s=block_s(problem.windows),
         single_visit=candidate.effect.single_visit(problem.plain.measurements, values),
         passes=passes,
-        doubt=value_doubt(candidate.effect, candidate.parameters, reported, problem.plain.measurements.profile),
+        doubt=value_doubt(candidate.effect, candidate.parameters, reported, problem.plain.measurements.profile)
+        or candidate.effect.doubt_where(reported, problem.plain.measurements),
         **shown,
     )
 

@@ -12,7 +12,7 @@ import pytest
 from ferryid.diagnose.checks import SensorFinding
 from ferryid.diagnose.checks.screening import ScreenedLog
 from ferryid.diagnose.data.estimate import Estimate
-from ferryid.diagnose.judging.conclude import order_remedies, remedies
+from ferryid.diagnose.judging.conclude import drift_of_waves, order_remedies, remedies
 from ferryid.diagnose.judging.judge import sensor_claims
 from ferryid.effects.force_model import Measurements
 from ferryid.vessel import load_profile, parse_profile
@@ -57,6 +57,14 @@ def test_orders_that_are_followed_late_are_stated_in_the_profile(effect: str, na
     assert order_remedies(profile, [found("wind")]) == ()
     for other in (profile_text(feedback=True), profile_text("time_constant_s = 0.3")):
         assert order_remedies(parse_profile(other, "boat.toml"), [late]) == ()
+
+
+def test_a_steady_load_beside_waves_may_be_some_of_their_drift() -> None:
+    wind, current, waves = found("wind"), found("current"), found("waves")
+    (said,) = drift_of_waves([wind, waves, current])
+    assert "the steady wind and current that was found beside them" in said
+    for others in ([wind], [waves], [replace(wind, probability=0.4), waves], [wind, replace(waves, probability=0.4)]):
+        assert drift_of_waves(others) == ()
 
 
 def test_what_the_signal_map_cannot_correct_has_no_line() -> None:
