@@ -294,12 +294,19 @@ def remedies(log: ScreenedLog, findings: Sequence[Finding]) -> tuple[str, ...]:
 
 
 def order_remedies(profile: Profile, findings: Sequence[Finding]) -> tuple[str, ...]:
-    """Return what a sure lag or delay means where no feedback goes with the orders, and the profile states nothing of them.
+    """Return what a sure lag or delay means where no feedback goes with the orders, and a lead where the profile states these.
 
     The number is left to the fit: what follows an order is a speed, and the lag of a diagnosis is one of the force.
     """
-    if not orders_alone(profile) or any(one.states_response for one in profile.signals):
+    if not orders_alone(profile):
         return ()
+    if stated := [one for one in profile.signals if one.states_response]:
+        if not any(one.effect == "time_delay" and one.parameters["seconds"].value < 0.0 for one in findings):
+            return ()
+        return (
+            f"The profile states how late the orders {listed([one.quantity for one in stated])} are followed: motion that "
+            "precedes its force may mean that this is too long.",
+        )
     late = {"thruster_lag": "time_constant", "time_delay": "seconds"}
     if not any(one.sure and one.effect in late and one.parameters[late[one.effect]].value > 0.0 for one in findings):
         return ()

@@ -55,6 +55,10 @@ def test_orders_that_are_followed_late_are_stated_in_the_profile(effect: str, na
     early = replace(late, parameters={name: Estimate(-0.614, -0.7, -0.5, "s")})
     assert order_remedies(profile, [early]) == ()
     assert order_remedies(profile, [found("wind")]) == ()
+    told = order_remedies(parse_profile(profile_text("time_constant_s = 0.3"), "boat.toml"), [early])
+    assert [one.endswith("motion that precedes its force may mean that this is too long.") for one in told] == (
+        [True] if effect == "time_delay" else []
+    )
     for other in (profile_text(feedback=True), profile_text("time_constant_s = 0.3")):
         assert order_remedies(parse_profile(other, "boat.toml"), [late]) == ()
 
