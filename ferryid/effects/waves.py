@@ -73,13 +73,13 @@ def doubt(values: Values, profile: Profile) -> str:
 
 
 def says(values: Values, instance: str | None) -> str:
-    """Return the finding as a sentence."""
+    """Return the finding as a sentence: the period is that of the force, which long waves have less of than their height."""
     forces = [
         f"{values[name]:.0f} {unit}" for name, unit in (("force_std", "N"), ("moment_std", "N·m")) if name in values
     ]
     return (
-        f"Waves of {1.0 / values['peak_frequency']:.1f} s pushed the vessel with {' and '.join(forces)} "
-        f"({plural(len(forces), 'standard deviation')}), which nothing measured explains{_grown(values)}."
+        f"Waves pushed the vessel with {' and '.join(forces)} ({plural(len(forces), 'standard deviation')}), most at a period of "
+        f"{1.0 / values['peak_frequency']:.1f} s, which nothing measured explains{_grown(values)}."
     )
 
 

@@ -27,7 +27,9 @@ EVERY = {"peak_frequency": 0.4, "force_std": 61.6, "moment_std": 104.4, "time_co
 )
 def test_the_sentence_tells_the_strengths_that_are_known(known: tuple[str, ...], strength: str) -> None:
     says = EFFECT.says({name: EVERY[name] for name in known}, None)
-    assert says == f"Waves of 2.5 s pushed the vessel with {strength}, which nothing measured explains."
+    assert (
+        says == f"Waves pushed the vessel with {strength}, most at a period of 2.5 s, which nothing measured explains."
+    )
 
 
 @pytest.mark.parametrize(("peak", "periods"), [(1.0, 1.17), (3.3, 1.51)])
