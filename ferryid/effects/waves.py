@@ -78,8 +78,8 @@ def says(values: Values, instance: str | None) -> str:
         f"{values[name]:.0f} {unit}" for name, unit in (("force_std", "N"), ("moment_std", "N·m")) if name in values
     ]
     return (
-        f"Waves pushed the vessel with {' and '.join(forces)} ({plural(len(forces), 'standard deviation')}), most at a period of "
-        f"{1.0 / values['peak_frequency']:.1f} s, which nothing measured explains{_grown(values)}."
+        f"Waves pushed the vessel with {' and '.join(forces)} ({plural(len(forces), 'standard deviation')}), most at a "
+        f"period of {1.0 / values['peak_frequency']:.1f} s, which nothing measured explains{_grown(values)}."
     )
 
 
