@@ -20,7 +20,7 @@ from ferryid.identify import FitOutcome, FitSettings, fit_logs
 from ferryid.identify.fit_data import Coefficients
 from ferryid.identify.prediction_windows import PredictionWindows
 from ferryid.identify.split import Split
-from ferryid.models import Model, blank_model, usable_rows
+from ferryid.models import Conditions, Model, Quantity, StoredEffect, blank_model, usable_rows
 from ferryid.models.forces.estimator import base_estimator, model_estimator
 from ferryid.models.prediction import Prediction, window_averages, window_errors
 from ferryid.models.scores import force_scores
@@ -240,6 +240,27 @@ def test_a_training_log_in_another_format_and_a_part_of_it_are_no_evidence(fitte
         ["new", "bare"], [replace(fitted.model, version=1), replace(fitted.model, version=2, training=())]
     )
     assert compare(field, [str(copy)], RunContext(tmp_path)).logs[0].trained == ("milliampere@1",)
+
+
+@pytest.mark.slow
+def test_a_part_of_a_log_that_was_diagnosed_as_one_says_what_its_figures_lack(
+    fitted: FitOutcome, tmp_path: Path
+) -> None:
+    (log,) = fitted.model.training
+    wind = StoredEffect("wind", None, {name: Quantity(1.0, 0.5, 1.5, "m/s") for name in ("north", "east")}, ())
+    blown = replace(
+        fitted.model,
+        training=({**log, "name": "bag00-and-1-more", "files": ["bag00.mcap", "bag01.mcap"]},),
+        conditions=(Conditions("bag00-and-1-more", str(log["sha256"]), (wind,)),),
+    )
+
+    def warned(model: Model) -> bool:
+        told = evaluate(model, [str(LOG.with_suffix(".bag"))], RunContext(tmp_path, ranges=(("20", "60"),)))
+        return any(one.startswith("it is a part of bag00-and-1-more, ") for one in told["logs"][0]["warnings"])
+
+    assert warned(blown)
+    assert not warned(replace(blown, conditions=()))
+    assert not warned(replace(blown, training=(log,)))
 
 
 @pytest.mark.slow
