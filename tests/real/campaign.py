@@ -395,7 +395,9 @@ def tank() -> str:
         reached = reached and not sure and not hinted
         rows.append(f"| {name} | {len(made)} | {_listed(sure)} | {_listed(hinted)} | {seconds:.0f} |")
         if not each:
-            notes = [f"- {note}" for note in made[0].notes if all(note in one.notes for one in made)]
+            notes = [
+                f"- {note.replace(f'{DATA}/', '')}" for note in made[0].notes if all(note in one.notes for one in made)
+            ]
     return "\n".join(
         [
             "\n## KVLCC2 in a towing tank\n",
@@ -427,7 +429,7 @@ def pool() -> str:
             f"{len(logs)} bags of half a minute to a minute and a half, together, in {seconds:.0f} s. Nobody measured wind or "
             f"current. Of the environment named: {_listed(sure)}; as a hint: {_listed(hinted)}.",
             "",
-            *[f"- {note}" for note in made[0].notes if all(note in one.notes for one in made)],
+            *[f"- {note.replace(f'{DATA}/', '')}" for note in made[0].notes if all(note in one.notes for one in made)],
         ]
     )
 
