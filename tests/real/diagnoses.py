@@ -149,7 +149,9 @@ def _notes(made: Sequence[Diagnosis]) -> list[str]:
     counts: dict[str, int] = {}
     for one in made:
         for note in one.notes:
-            counts[note] = counts.get(note, 0) + 1
+            # The page has no folders of the machine that made it.
+            said = note.replace(f"{DATA}/", "")
+            counts[said] = counts.get(said, 0) + 1
     return [f"- {note}" + (f" ({count} logs)" if count > 1 else "") for note, count in counts.items()]
 
 
