@@ -161,8 +161,8 @@ def _unanswered(logs: Sequence[AveragedLog], profile: Profile) -> tuple[str, ...
     what, _, remedy = why.partition(". Fix: ")
     also = f" So it is in {counted(more, 'more log')}." if more else ""
     return (
-        f"{path}: {what}. What is found of forces in such a log means little.{also} Fix: see whether the actuators were "
-        f"engaged, or {remedy}",
+        f"{name_of_log(path)}: {what}. What is found of forces in such a log means little.{also} Fix: see whether the "
+        f"actuators were engaged, or {remedy}",
     )
 
 

@@ -72,8 +72,9 @@ def diagnose_log(
     except FerryIdError as error:
         return Diagnosis("refused", time.perf_counter() - start, error=_within(profile.parent, str(error)))
     return Diagnosis.from_json(
-        {name: made[name] for name in ("verdict", "notes", "before", "after")}
+        {name: made[name] for name in ("verdict", "before", "after")}
         | {
+            "notes": [_within(profile.parent, note) for note in made["notes"]],
             "seconds": seconds,
             "findings": [_finding(one) for one in made["findings"]],
             "model": None if made["model"] is None else os.path.relpath(made["model"], out),

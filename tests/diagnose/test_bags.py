@@ -15,7 +15,7 @@ from ferryid.errors import FerryIdError
 from ferryid.simulate import parse_scenario, simulate, write_log
 from ferryid.types import IN_MEMORY
 from ferryid.vessel import load_profile
-from tests.bags import cut
+from tests.ingest.bags import cut
 
 pytestmark = pytest.mark.slow
 

@@ -278,7 +278,7 @@ def test_a_log_by_itself_comes_with_what_explains_that_its_force_has_no_answer(
     (found,) = engaged([(CAMPAIGN, Gathered((adrift(logs[0]), adrift(logs[1]), logs[2])))], FERRY)
     assert len(found.logs) == 3
     (note,) = found.notes
-    assert note.startswith(f"{days[0]}: the applied forces accelerate the vessel by surge 0.01")
+    assert note.startswith(f"{Path(days[0]).name}: the applied forces accelerate the vessel by surge 0.01")
     assert "So it is in 1 more log. Fix: see whether the actuators were engaged, or in milliampere, correct" in note
     assert "Left out" not in note
     assert engaged([(CAMPAIGN, Gathered(logs[:1]))], FERRY) == (Gathered(logs[:1]),)

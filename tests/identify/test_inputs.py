@@ -22,9 +22,9 @@ from ferryid.signals.prepare import Opened, open_track
 from ferryid.signals.smooth import Measured
 from ferryid.types import RunContext
 from ferryid.vessel import load_profile
-from tests.bags import cut
 from tests.identify.rounds import PROFILE, recorded_as
 from tests.identify.trials import measured
+from tests.ingest.bags import cut
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
 NOWHERE = RunContext(Path("nowhere"))
