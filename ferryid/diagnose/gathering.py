@@ -111,8 +111,6 @@ def gather(
     errors = {path: one for path in joined.paths if isinstance(one := made[path], FerryIdError)}
     if not found:
         raise next(iter(errors.values()))
-    errors |= _unengaged(found, profile)
-    found = [one for one in found if one.path not in errors]
     whose = REFERENCES if references else CAMPAIGN
     notes = [*joined.notes, *left_out_of(whose, errors)]
     notes += [
@@ -145,12 +143,6 @@ def unused(paths: Sequence[str], groups: Sequence[Group]) -> tuple[tuple[str, st
     return tuple(found.items())
 
 
-def _unengaged(logs: Sequence[AveragedLog], profile: Profile) -> dict[str, FerryIdError]:
-    """Return the errors of logs in which the actuators were not engaged, where others show that the vessel follows them."""
-    responses = {one.path: one.screened.measured.response for one in logs}
-    return {path: FerryIdError(f"{path}: {why}") for path, why in unengaged(responses, profile).items()}
-
-
 def _unanswered(logs: Sequence[AveragedLog], profile: Profile) -> tuple[str, ...]:
     """Return a sentence on logs that are used though the vessel hardly follows the applied force in them."""
     told = {one.path: unanswered_force(one.screened.measured.response, profile) for one in logs}
@@ -179,9 +171,10 @@ def engaged(groups: Sequence[tuple[str, Gathered]], profile: Profile) -> tuple[G
     profile
         The vessel.
     """
-    errors, found = _unengaged([one for _, group in groups for one in group.logs], profile), list[Gathered]()
+    responses = {one.path: one.screened.measured.response for _, group in groups for one in group.logs}
+    reasons, found = unengaged(responses, profile), list[Gathered]()
     for whose, group in groups:
-        here = {one.path: errors[one.path] for one in group.logs if one.path in errors}
+        here = {one.path: FerryIdError(f"{one.path}: {reasons[one.path]}") for one in group.logs if one.path in reasons}
         kept = tuple(one for one in group.logs if one.path not in here)
         # References are no more than help; what is diagnosed or compared is not empty.
         without = bool(kept) or whose == REFERENCES

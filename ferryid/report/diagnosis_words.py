@@ -138,7 +138,7 @@ def _rest(diagnosis: Diagnosis) -> list[str]:
     if much:
         parts.append(f"In {listed(much)} more force is left over than is explained.")
     if not diagnosis.remainder.testable:
-        parts.append("Whether more is missing, this log cannot show.")
+        parts.append(f"Whether {'that is all' if unknown or much else 'more is missing'}, this log cannot show.")
     return parts
 
 

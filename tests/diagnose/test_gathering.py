@@ -286,6 +286,7 @@ def test_a_log_by_itself_comes_with_what_explains_that_its_force_has_no_answer(
 
 def test_an_unengaged_run_of_the_catamaran_is_left_out_of_its_campaign(shared_data: Callable[[str], Path]) -> None:
     bags = [str(one) for one in sorted(shared_data("vtec_usv").glob("*.bag"))[:4]]
-    found = gather(bags, load_profile("vtec-usv"), IN_MEMORY)
+    profile = load_profile("vtec-usv")
+    (found,) = engaged([(CAMPAIGN, gather(bags, profile, IN_MEMORY))], profile)
     assert [Path(one.path).name[:5] for one in found.logs] == ["48000", "exp37", "exp38"]
-    assert "52000_2016-02-11-10-40-10.bag: the applied forces accelerate the vessel by surge 0.0" in found.notes[0]
+    assert any("52000_2016-02-11-10-40-10.bag: the applied forces accelerate" in note for note in found.notes)

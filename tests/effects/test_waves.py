@@ -9,10 +9,11 @@ import pytest
 from scipy.optimize import minimize
 
 from ferryid.effects import effects
-from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
+from ferryid.vessel import load_profile
 
 EFFECT = effects()["waves"]
+FERRY = load_profile("milliampere")
 EVERY = {"peak_frequency": 0.4, "force_std": 61.6, "moment_std": 104.4, "time_constant": 6.0}
 
 
@@ -49,4 +50,8 @@ def test_a_sea_keeps_its_phase_for_longer_than_the_least(peak: float, periods: f
     best = minimize(deviance, np.zeros(3), method="Nelder-Mead", options={"maxiter": 2000})
     memory, centre = np.exp(best.x[:2])
     assert memory * centre == pytest.approx(periods, abs=0.02)
-    assert periods > EFFECTS.least_coherence
+    values = {"peak_frequency": 0.4 * float(centre), "time_constant": float(memory) / 0.4}
+    assert EFFECT.doubt(values, FERRY) == ""
+    assert "a sea is coherent for longer" in EFFECT.doubt(
+        values | {"time_constant": 0.8 / values["peak_frequency"]}, FERRY
+    )

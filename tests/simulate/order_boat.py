@@ -6,6 +6,7 @@ from pathlib import Path
 
 from ferryid.simulate import load_scenario, simulate
 from ferryid.simulate.trial import Simulation
+from ferryid.validation.prior_profile import NAVIGATION
 
 PROFILE = """schema = "ferryid.vessel/1"
 name = "cat"
@@ -27,25 +28,6 @@ name = "right"
 kind = "propeller"
 position_m = [-0.5, 0.35]
 thrust = { kind = "quadratic", input = "rpm", ahead = 2.0e-5, astern = 1.2e-5, valid = [-1000, 1000] }
-[signals.position]
-topic = "/navigation/odometry"
-fields = ["pose.pose.position.x", "pose.pose.position.y"]
-unit = "m"
-frame = "NED"
-[signals.heading]
-topic = "/navigation/odometry"
-quaternion = ["pose.pose.orientation.x", "pose.pose.orientation.y", "pose.pose.orientation.z", "pose.pose.orientation.w"]
-frame = "NED"
-[signals.velocity]
-topic = "/navigation/odometry"
-fields = ["twist.twist.linear.x", "twist.twist.linear.y"]
-unit = "m/s"
-frame = "FRD"
-[signals.yaw_rate]
-topic = "/navigation/odometry"
-field = "twist.twist.angular.z"
-unit = "rad/s"
-frame = "FRD"
 """
 SCENARIO = """schema = "ferryid.scenario/1"
 vessel = "boat.toml"
@@ -67,18 +49,22 @@ camera_rate_hz = 0
 def profile_text(*lines: str, feedback: bool = False) -> str:
     """Return the profile with more lines in the table of each order, or with feedback in the place of orders."""
     what, topic = ("", "state") if feedback else (".command", "command")
-    return PROFILE + "".join(
-        "\n".join(
-            [
-                f'[signals."{name}.speed{what}"]',
-                f'topic = "/{name}/{topic}"',
-                'field = "speed"',
-                'unit = "rpm"',
-                *lines,
-                "",
-            ]
+    return (
+        PROFILE
+        + NAVIGATION.partition("[signals.tau_d]")[0]
+        + "".join(
+            "\n".join(
+                [
+                    f'[signals."{name}.speed{what}"]',
+                    f'topic = "/{name}/{topic}"',
+                    'field = "speed"',
+                    'unit = "rpm"',
+                    *lines,
+                    "",
+                ]
+            )
+            for name in ("left", "right")
         )
-        for name in ("left", "right")
     )
 
 

@@ -9,6 +9,30 @@ import pytest
 from ferryid.vessel import parse_profile
 from ferryid.vessel.profile import Profile
 
+STERN_BOAT = """schema = "ferryid.vessel/1"
+name = "boat"
+source = "made up for a test"
+[hull]
+mass_kg = 100.0
+inertia_z = 200.0
+[signals.velocity]
+topic = "/nav"
+fields = ["u", "v"]
+unit = "m/s"
+frame = "FRD"
+[signals.yaw_rate]
+topic = "/nav"
+field = "r"
+unit = "rad/s"
+frame = "FRD"
+[[actuator]]
+name = "stern"
+kind = "{kind}"
+position_m = [-1.0, 0.0]
+{more}
+"""
+"""A boat with one actuator, stern, of some `kind`, with `more` lines of it; other signals are to follow."""
+
 ROLE = {"speed": "rpm", "force": "N", "thrust": "N"}
 
 

@@ -10,41 +10,18 @@ from ferryid.vessel import describe, follow_orders, parse_profile
 from ferryid.vessel.order_response import OrderResponse, followed_orders
 from ferryid.vessel.profile import Profile
 from ferryid.vessel.thrusters import actuator_columns
+from tests.vessel.conftest import STERN_BOAT
 
 STEP_S = 0.1
 T = np.arange(0.0, 12.0, STEP_S)
-HEAD = """schema = "ferryid.vessel/1"
-name = "boat"
-source = "made up for a test"
-[hull]
-mass_kg = 100.0
-inertia_z = 200.0
-[signals.velocity]
-topic = "/nav"
-fields = ["u", "v"]
-unit = "m/s"
-frame = "FRD"
-[signals.yaw_rate]
-topic = "/nav"
-field = "r"
-unit = "rad/s"
-frame = "FRD"
-[[actuator]]
-name = "stern"
-kind = "azimuth"
-position_m = [-1.0, 0.0]
-thrust = { kind = "quadratic", ahead = 0.01 }
-[signals."stern.angle.command"]
-topic = "/order"
-field = "angle"
-unit = "rad"
-"""
+THRUST = 'thrust = { kind = "quadratic", ahead = 0.01 }'
+ANGLE = '[signals."stern.angle.command"]\ntopic = "/order"\nfield = "angle"\nunit = "rad"\n'
 ORDER = '[signals."stern.speed.command"]\ntopic = "/order"\nfield = "n"\nunit = "rpm"\n'
 MEASURED = '[signals."stern.speed"]\ntopic = "/state"\nfield = "n"\nunit = "rpm"\n'
 
 
 def boat(speed: str, angle: str = "") -> Profile:
-    return parse_profile(HEAD + angle + speed, "boat.toml")
+    return parse_profile(STERN_BOAT.format(kind="azimuth", more=THRUST) + ANGLE + angle + speed, "boat.toml")
 
 
 @pytest.mark.parametrize(("time_constant_s", "delay_s"), [(0.7, 0.0), (0.0, 0.4), (0.7, 0.4), (0.5, 0.25)])

@@ -18,34 +18,13 @@ from ferryid.ingest.log import Series, Topic
 from ferryid.vessel import convert, parse_profile, select
 from ferryid.vessel.profile import Profile
 from ferryid.vessel.pulses import pulse_of_share, share_of_pulse
+from tests.vessel.conftest import STERN_BOAT
 
-HEAD = """schema = "ferryid.vessel/1"
-name = "boat"
-source = "made up for a test"
-[hull]
-mass_kg = 100.0
-inertia_z = 200.0
-[signals.velocity]
-topic = "/nav"
-fields = ["u", "v"]
-unit = "m/s"
-frame = "FRD"
-[signals.yaw_rate]
-topic = "/nav"
-field = "r"
-unit = "rad/s"
-frame = "FRD"
-[[actuator]]
-name = "stern"
-kind = "{kind}"
-position_m = [-1.0, 0.0]
-{more}
-"""
 THRUST = 'thrust = { kind = "quadratic", ahead = 0.01 }'
 
 
 def boat(signals: str, kind: str = "propeller", more: str = THRUST) -> Profile:
-    return parse_profile(HEAD.format(kind=kind, more=more) + signals, "boat.toml")
+    return parse_profile(STERN_BOAT.format(kind=kind, more=more) + signals, "boat.toml")
 
 
 def signal(role: str, *lines: str) -> str:

@@ -200,6 +200,16 @@ def test_a_repeated_sample_explains_no_forces_that_were_not_testable() -> None:
     )
 
 
+def test_a_log_that_shows_that_more_is_missing_cannot_show_only_whether_that_is_all() -> None:
+    remainder = Remainder(testable=False)
+    one = Diagnosis(
+        "log", "ferry", verdict_of((SURE, NAMELESS), remainder), (SURE, NAMELESS), {}, {}, remainder=remainder
+    )
+    assert headline(one).endswith(
+        " More is missing, which nothing known here explains. Whether that is all, this log cannot show."
+    )
+
+
 def test_hints_of_several_logs_are_told_as_hints() -> None:
     logs = [
         Diagnosis(name, "ferry", verdict_of(findings, Remainder()), findings, {}, {})
