@@ -21,6 +21,7 @@ from ferryid.diagnose.inference.estimation import (
     starting_point,
     without,
 )
+from ferryid.diagnose.inference.needed_correction import needed
 from ferryid.diagnose.inference.onset_estimation import (
     COMPARING_ITERATIONS,
     FIRST_TIME_STEP_S,
@@ -134,6 +135,8 @@ def search(
     while True:
         taken = {candidate.key for candidate in chosen.candidates}
         left = [candidate for candidate in steady if candidate.key not in taken]
+        # What all actuators that are too weak by one factor do as well, in fewer parameters, is decided first.
+        left = [candidate for candidate in left if needed(problem, candidate)] or left
         progress(f"weighing {len(left)} hypotheses beside {len(taken) or 'none'} found")
         found = _ranked_candidates(problem, chosen, left, about)
         rounds.append(_round(found))
@@ -397,14 +400,17 @@ def is_negligible(problem: EstimationProblem, made: Fit, index: int = -1) -> boo
 
 
 def prune(problem: EstimationProblem, chosen: Fit) -> Fit:
-    """Drop one by one what the others explain as well without it, and what passes without being an event beside them."""
+    """Drop one by one what the others explain as well without it, and what passes without being an event beside them.
+
+    What is needed stays, see `ferryid.diagnose.inference.needed_correction.needed`.
+    """
     for key in [candidate.key for candidate in chosen.candidates if candidate.effect.passing]:
         index = [candidate.key for candidate in chosen.candidates].index(key)
         bare = without(problem, chosen, index)
         if not stands_out(problem, linearise(problem, bare, starting_point(problem, bare)), chosen.candidates[index]):
             chosen = bare
-    while chosen.candidates:
-        fewer = over(partial(without, problem, chosen), range(len(chosen.candidates)))
+    while questioned := [k for k, candidate in enumerate(chosen.candidates) if not needed(problem, candidate)]:
+        fewer = over(partial(without, problem, chosen), questioned)
         best = max(over(partial(refit_with_own_noise, problem), fewer), key=lambda one: one.evidence)
         if max(chosen.evidence, refit_with_own_noise(problem, chosen).evidence) - best.evidence >= INFERENCE.prior_odds:
             break

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, without
+from ferryid.diagnose.inference.needed_correction import needed
 from ferryid.diagnose.inference.onset_estimation import is_brief
 from ferryid.diagnose.inference.search import is_negligible, prune
 from ferryid.diagnose.judging.axis_consistency import check_axis_consistency
@@ -30,6 +31,8 @@ PLACEBO = (
 INCONSISTENT = "on an axis where it would have to act, most of it is missing"
 BRIEF = "it acts for less time than held-out data can judge, and its 95 % interval includes no effect at all"
 SAME_CURVE = "another shape of the same thrust curve, as idealised, explains nearly as much as both together"
+UNRIVALLED = RivalComparison((), 1.0)
+"""Standing of what no other effect could stand in for."""
 LAW = "an empirical law of the motion explains more in that place, and leaves nothing to explain"
 
 
@@ -120,7 +123,10 @@ def _spans(made: Fit) -> frozenset[tuple[object, ...]]:
 
 
 def _standings(problem: EstimationProblem, kept: Fit, library: Sequence[Candidate]) -> tuple[RivalComparison, ...]:
-    return tuple(compare_rivals(problem, kept, i, library) for i in range(len(kept.candidates)))
+    return tuple(
+        UNRIVALLED if needed(problem, one) else compare_rivals(problem, kept, i, library)
+        for i, one in enumerate(kept.candidates)
+    )
 
 
 def _told(fallen_by_reason: Mapping[str, Sequence[str]]) -> tuple[str, ...]:
@@ -134,20 +140,21 @@ def _told(fallen_by_reason: Mapping[str, Sequence[str]]) -> tuple[str, ...]:
 
 def _fallen(problem: EstimationProblem, kept: Fit, proof: HeldOutEvidence | None) -> tuple[int | None, str]:
     """Return the candidate that stands least, and why it falls, if that is worth telling; None where all stand."""
+    questioned = [i for i, one in enumerate(kept.candidates) if not needed(problem, one)]
     if proof is not None:
-        fallen = [i for i, one in enumerate(proof.proofs) if not one.holds]
+        fallen = [i for i in questioned if not proof.proofs[i].holds]
         if fallen:
             worst = min(fallen, key=lambda i: proof.proofs[i].beaten)
             return worst, PLACEBO
     # Beside what was found later, it may be hardly anything: nothing to tell, and no sign of another cause.
-    idle = [i for i in range(len(kept.candidates)) if is_negligible(problem, kept, i)]
+    idle = [i for i in questioned if is_negligible(problem, kept, i)]
     if idle:
         return idle[0], ""
     # Whatever came just then would do as well: neither its size nor stretches kept from the fit show that it is this.
-    unsized = [i for i in range(len(kept.candidates)) if _is_brief_and_unsized(problem, kept, i)]
+    unsized = [i for i in questioned if _is_brief_and_unsized(problem, kept, i)]
     if unsized:
         return unsized[0], BRIEF
-    inconsistent = [i for i in range(len(kept.candidates)) if check_axis_consistency(problem, kept, i).inconsistent]
+    inconsistent = [i for i in questioned if check_axis_consistency(problem, kept, i).inconsistent]
     if inconsistent:
         return inconsistent[0], INCONSISTENT
     shapes = redundant_shape(kept.candidates, partial(_evidence_without, problem, kept))
