@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from tests.bench.diagnosis import STEPS
@@ -39,7 +40,7 @@ def run(quick: bool) -> Section:
             (f"campaign of {bags} bags of {BAG_S} s", parted, BAGS_GOAL_S),
         )
         rows: list[Row | Timed] = [
-            *(_timed(what, (run.took_s, run.peak), goal_s) for what, run, goal_s in timed),
+            *(replace(_timed(what, (run.took_s, run.peak), goal_s), limit=run.limit) for what, run, goal_s in timed),
             _memory(
                 f"campaign of {SEASON} logs of {of}, memory by {logs} and {more} logs",
                 grown(some.peak, every.peak, logs, more),

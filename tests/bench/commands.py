@@ -13,7 +13,7 @@ from ferryid.batch.kept import key_of, read_row, write_row
 from ferryid.batch.log_result import LogFile
 from ferryid.simulate import load_scenario, simulate, write_log
 from tests.bench.page import Row, Section, Timed, faster_row
-from tests.bench.processes import SHORT_INTERVAL_S, floor, sampled_process, whole_process
+from tests.bench.processes import SHORT_INTERVAL_S, imports, sampled_process, whole_process
 from tests.bench.trials import SCALE, VESSEL
 
 TABLES = ("numpy", "pyarrow", "pyarrow.parquet", "typer")
@@ -70,34 +70,52 @@ def run(quick: bool) -> Section:
         write_log(simulate(load_scenario("twelve-corner"), 12), trial)
         scenario.write_text(ROUND, encoding="utf-8")
         log = ("--log", str(folder / "round.mcap"), "--overwrite")
-        rows = [
-            _row("ferryid fit, 24 min, with its report", _fits(folder, trial, (), repeats), 1.5),
-            _row("ferryid fit --no-report, 24 min", _fits(folder, trial, ("--no-report",), repeats), 0.8),
-            _row("ferryid simulate, 12 min", _times([("simulate", str(scenario), *log)] * (repeats + 1))[1:], 1.0),
-            *([] if quick else _compiled(folder, scenario)),
-        ]
-        resume = _resumable(folder / "batch", logs)
-        rows.append(_row(f"ferryid batch, {logs} logs and nothing to do", _times([resume] * repeats), 5.0))
+        simulation, resume = ("simulate", str(scenario), *log), _resumable(folder / "batch", logs)
         fit = ("fit", str(trial), *VESSEL, *SCALE)
-        where = [
-            floor(what, sampled_process(words, steps, interval_s=SHORT_INTERVAL_S), packages)
-            for what, words, steps, packages in (
-                (
-                    "`fit` of 24 min",
-                    (*fit, "--out", str(folder / "page")),
-                    FIT_STEPS,
-                    (*TABLES, *STATISTICS, "matplotlib.figure"),
-                ),
-                (
-                    "`fit --no-report`",
-                    (*fit, "--no-report", "--out", str(folder / "bare")),
-                    FIT_STEPS,
-                    (*TABLES, *STATISTICS),
-                ),
-                ("`simulate` of 12 min", ("simulate", str(scenario), *log), SIMULATION_STEPS, COMPILED),
-                (f"`batch` of {logs} logs and nothing to do", resume, BATCH_STEPS, ("numpy", "typer")),
-            )
-        ]
+        rows, where = list[Row | Timed](), list[str]()
+        for what, title, took, goal_s, words, steps, packages in (
+            (
+                "ferryid fit, 24 min, with its report",
+                "`fit` of 24 min",
+                _fits(folder, trial, (), repeats),
+                1.5,
+                (*fit, "--out", str(folder / "page")),
+                FIT_STEPS,
+                (*TABLES, *STATISTICS, "matplotlib.figure"),
+            ),
+            (
+                "ferryid fit --no-report, 24 min",
+                "`fit --no-report`",
+                _fits(folder, trial, ("--no-report",), repeats),
+                0.8,
+                (*fit, "--no-report", "--out", str(folder / "bare")),
+                FIT_STEPS,
+                (*TABLES, *STATISTICS),
+            ),
+            (
+                "ferryid simulate, 12 min",
+                "`simulate` of 12 min",
+                _times([simulation] * (repeats + 1))[1:],
+                1.0,
+                simulation,
+                SIMULATION_STEPS,
+                COMPILED,
+            ),
+            (
+                f"ferryid batch, {logs} logs and nothing to do",
+                f"`batch` of {logs} logs and nothing to do",
+                _times([resume] * repeats),
+                5.0,
+                resume,
+                BATCH_STEPS,
+                ("numpy", "typer"),
+            ),
+        ):
+            run, alone = sampled_process(words, steps, interval_s=SHORT_INTERVAL_S), imports(packages)
+            limit = alone.limit(run, goal_s)
+            rows.append(Timed(f"{what}, whole process", statistics.median(took), goal_s, limit=limit))
+            where.append(alone.floor(title, run))
+        rows += [] if quick else _compiled(folder, scenario)
     notes = (
         *where,
         "The log of a fit is read each time; what numba compiles is kept from the first run. The logs of the batch are links "
@@ -151,8 +169,3 @@ def _resumable(folder: Path, logs: int) -> tuple[str, ...]:
 
 def _times(commands: Sequence[Sequence[str]]) -> list[float]:
     return [whole_process(words)[0] for words in commands]
-
-
-def _row(what: str, took: Sequence[float], goal_s: float) -> Timed:
-    """Row of a command and the time that it should take at most."""
-    return Timed(f"{what}, whole process", statistics.median(took), goal_s)

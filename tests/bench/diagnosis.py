@@ -15,7 +15,7 @@ from ferryid.validation.log_generation import generate
 from ferryid.vessel import load_profile
 from tests.bench.page import Curve, Row, Section, Timed, duration
 from tests.bench.preparing import preparing
-from tests.bench.processes import Sampled, floor, middle, sampled_process
+from tests.bench.processes import Sampled, imports, middle, sampled_process
 from tests.bench.trials import VESSEL, written
 from tests.evidence import ROOT
 
@@ -75,19 +75,19 @@ def run(quick: bool) -> Section:
                 repeats = REPEATS if kind is single and number <= REPEATED_S and not quick else 1
                 measured = _measured(paths, folder, repeats)
                 size = number / 60 if kind is single else number
-                what, took, much = title.format(size), measured.took_s, measured.peak
-                times[size] = took
-                rows.append(_row(what, took, much, goals[number], next(iter(times.values()))))
+                what = title.format(size)
+                times[size] = measured.took_s
+                rows.append(_row(what, measured, goals[number], next(iter(times.values()))))
                 if goals[number] is not None or quick:
                     shortest = kind is single and len(times) == 1
-                    where.append(floor(what, measured, PACKAGES) if shortest else measured.where(what))
+                    where.append(imports(PACKAGES).floor(what, measured) if shortest else measured.where(what))
             if len(times) > 1:
                 curves.append(
                     Curve(f"diagnose, {'one log' if kind is single else 'campaign'}", against, list(times.items()))
                 )
         if not quick:
             for what, measured, goal_s in _of_proof(folder):
-                rows.append(_row(what, measured.took_s, measured.peak, goal_s, measured.took_s))
+                rows.append(_row(what, measured, goal_s, measured.took_s))
                 where.append(measured.where(what))
         notes = [
             "Whole processes, report included, on tables that were ingested before; logs of up to "
@@ -134,11 +134,11 @@ def _measured(paths: list[Path], folder: Path, repeats: int) -> Sampled:
     return middle([sampled_process(command, STEPS) for _ in range(repeats)])
 
 
-def _row(what: str, took: float, much: int, goal_s: float | None, smallest_s: float) -> Row | Timed:
-    memory = f", {much / 1e9:.2f} GB"
+def _row(what: str, run: Sampled, goal_s: float | None, smallest_s: float) -> Row | Timed:
+    took, memory = run.took_s, f", {run.peak / 1e9:.2f} GB"
     if goal_s is None:
         return Row(what, duration(took) + memory, "the smallest of these", duration(smallest_s), took / smallest_s)
-    return Timed(what, took, goal_s, memory)
+    return Timed(what, took, goal_s, memory, limit=run.limit)
 
 
 def _growth(curve: Curve) -> str:

@@ -15,6 +15,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -41,7 +42,7 @@ from ferryid.vessel import load_profile
 from tests.bench import logs, rivals
 from tests.bench.page import Row, Section, duration, faster, faster_row, in_turn, within_row
 from tests.bench.preparing import preparing
-from tests.bench.processes import SHORT_INTERVAL_S, floor, middle, sampled_process
+from tests.bench.processes import SHORT_INTERVAL_S, imports, middle, sampled_process
 
 PROFILE = Path(__file__).with_name("bench.toml")
 FORMATS = {"mcap": ("zstd", "lz4", "none"), "bag": ("lz4", "none"), "db3": ("none",)}
@@ -188,11 +189,16 @@ def read_and_write(folder: Path, short: float, long: float) -> tuple[list[Row], 
             )
             least.append(row)
             work = partial(columns_to_parquet, logs.log(folder, kind, compression, long))
+            steps = processor_times(work)
+            alone = f"to {told} and to write the same Parquet, one after the other, is"
+            alone = f"{alone} {rosbags_s / (unpacked_s + written_s):.3g} times as fast as rosbags"
+            first = rows[long, kind, compression][0]
+            rows[long, kind, compression][0] = replace(first, limit=f"{alone[0].upper()}{alone[1:]}. {largest(steps)}")
             notes.append(
-                f"{name}: to {told} takes {duration(unpacked_s)} and writing {duration(written_s)}, one after the other "
-                f"{rosbags_s / (unpacked_s + written_s):.3g} times as fast as rosbags; of the {row.ours} of both and what is "
-                f"between, {between(work)}."
+                f"{name}: to {told} takes {duration(unpacked_s)} and writing {duration(written_s)}; {alone}; of the "
+                f"{row.ours} of both and what is between, {between(steps)}."
             )
+            least[-1] = replace(row, limit=largest(steps))
     plain = [row for minutes in lengths for kind, compression in PLAIN for row in rows[minutes, kind, compression]]
     return [*plain, *least], notes, zstd_s
 
@@ -228,10 +234,18 @@ STEPS: Mapping[str, tuple[tuple[Any, str], ...]] = {
     "writing": ((cache, "write_table"), (cache, "table_checksum")),
 }
 """Functions whose processor time, in whatever thread, is a step's; that of checksums is taken from decompressing's."""
+LEAST = ("fetching rows", "decompressing", "writing")
+"""Steps that the least work conceivable has as well."""
+LARGEST = 3
+"""Steps that are named of what limits a reading."""
 
 
-def between(read: Callable[[], object]) -> str:
-    """Return the processor time of the steps of reading a log, and of writing it, as a part of a sentence."""
+OTHERS = "the rest"
+"""What is none of the steps."""
+
+
+def processor_times(read: Callable[[], object]) -> dict[str, float]:
+    """Return the processor time of the steps of reading a log, of writing it, and of the rest [s]."""
     took = dict.fromkeys(STEPS, 0.0)
 
     def timed(step: str, function: Callable[..., Any]) -> Callable[..., Any]:
@@ -252,9 +266,22 @@ def between(read: Callable[[], object]) -> str:
         read()
         whole_s = time.process_time() - start
     took["decompressing"] -= min(took["checksums of chunks"], took["decompressing"])
-    rest_s = max(whole_s - sum(took.values()), 0.0)
-    parts = [f"{step} {duration(step_s)}" for step, step_s in took.items() if step_s >= 0.01 * whole_s]
-    return f"processor time by steps, over {os.cpu_count()} cores: {', '.join(parts)}, the rest {duration(rest_s)}"
+    return {**took, OTHERS: max(whole_s - sum(took.values()), 0.0)}
+
+
+def between(steps: Mapping[str, float]) -> str:
+    """Return processor times of steps [s] as a part of a sentence; those under a hundredth are left out."""
+    whole_s = sum(steps.values())
+    parts = [f"{step} {duration(took)}" for step, took in steps.items() if took >= 0.01 * whole_s or step == OTHERS]
+    return f"processor time by steps, over {os.cpu_count()} cores: {', '.join(parts)}"
+
+
+def largest(steps: Mapping[str, float]) -> str:
+    """Return what takes most between reading and writing, of processor times [s], as a sentence."""
+    own = {step: took for step, took in steps.items() if step not in LEAST}
+    most = sorted(own.items(), key=lambda one: -one[1])[:LARGEST]
+    parts = ", ".join(f"{step} ({duration(took)})" for step, took in most)
+    return f"Beyond the least work, most processor time, over {os.cpu_count()} cores, goes into {parts}."
 
 
 def against_whole_camera_log(folder: Path, minutes: float) -> tuple[list[Row], list[str]]:
@@ -272,10 +299,12 @@ def against_whole_camera_log(folder: Path, minutes: float) -> tuple[list[Row], l
         columns(log)
         if compression == "none":
             file = next(log.glob("*.db3")) if log.is_dir() else log
-            rows.append(faster(what, partial(columns, log), "cat", partial(cat, file), 1.0, 5))
+            row = faster(what, partial(columns, log), "cat", partial(cat, file), 1.0, 5)
         else:
-            rows.append(faster(what, lambda log=log: columns(log), "decompress all", decompress(log), 4.0, 3))
-        notes.append(f"{what}: {between(partial(columns, log))}.")
+            row = faster(what, lambda log=log: columns(log), "decompress all", decompress(log), 4.0, 3)
+        steps = processor_times(partial(columns, log))
+        rows.append(replace(row, limit=largest(steps)))
+        notes.append(f"{what}: {between(steps)}.")
     return rows, notes
 
 
@@ -293,7 +322,7 @@ def against_rerun(folder: Path, minutes: float) -> tuple[list[Row], list[str]]:
     what = f"{minutes:g} min MCAP zstd: the same fields as arrays"
     rivals.rerun_columns(log)
     row = faster(what, lambda: columns(log), "rerun-sdk", lambda: rivals.rerun_columns(log), 2.0, 5)
-    return [row], [f"{what}: {between(partial(columns, log))}."]
+    return [row], [f"{what}: {between(processor_times(partial(columns, log)))}."]
 
 
 PACKAGES = ("numpy", "pyarrow", "pyarrow.parquet", "typer")
@@ -364,9 +393,12 @@ def as_process(folder: Path, minutes: float, repeats: int) -> tuple[list[Row], l
                 words = ("ingest", str(log), "--vessel", str(PROFILE), "--out", str(out))
                 runs.append(sampled_process(words, PROCESS_STEPS, interval_s=SHORT_INTERVAL_S))
         told = f"`ingest` of {minutes:g} min {NAMES[kind]} {compression}"
-        notes.append(floor(told, middle(runs), PACKAGES))
+        run, alone = middle(runs), imports(PACKAGES)
+        notes.append(alone.floor(told, run))
         what = f"{minutes:g} min {NAMES[kind]} {compression}: whole process"
-        rows += [faster_row(what, ours, name, took, goal) for (name, _, goal), took in zip(others, theirs, strict=True)]
+        for (name, _, goal), took in zip(others, theirs, strict=True):
+            limit = alone.limit(run, statistics.median(took) / goal)
+            rows.append(replace(faster_row(what, ours, name, took, goal), limit=limit))
     return rows, notes
 
 

@@ -27,7 +27,10 @@ PAGE_GOAL_S = 900.0
 
 @dataclass(frozen=True)
 class Row:
-    """One comparison; `goal` is what the ratio must reach (``"≥ 35"``), empty where none is set."""
+    """One comparison; `goal` is what the ratio must reach (``"≥ 35"``), empty where none is set.
+
+    `limit` says what was measured of the least that it can take, and of what takes the rest, in sentences.
+    """
 
     what: str
     ours: str
@@ -36,6 +39,7 @@ class Row:
     ratio: float
     goal: str = ""
     reached: bool | None = None
+    limit: str = ""
 
     @property
     def over_goal(self) -> float | None:
@@ -50,7 +54,8 @@ class Row:
 class Timed:
     """What has a goal in seconds: time and goal become multiples of the yardstick (`tests.bench.yardstick`).
 
-    `more` stands behind the time; `otherwise` tells whether what else is asked of it, such as memory, is kept.
+    `more` stands behind the time; `otherwise` tells whether what else is asked of it, such as memory, is kept; `limit` is as of
+    `Row`.
     """
 
     what: str
@@ -58,6 +63,7 @@ class Timed:
     goal_s: float
     more: str = ""
     otherwise: bool = True
+    limit: str = ""
 
     def row(self, yardstick_s: float) -> Row:
         """Return the row of the page, by what the yardstick took in this run [s]."""
@@ -70,6 +76,7 @@ class Timed:
             ratio,
             f"≤ {goal:.3g} ({self.goal_s:g} s)",
             ratio <= goal and self.otherwise,
+            self.limit,
         )
 
 
@@ -252,6 +259,7 @@ def page(sections: Sequence[Section], quick: bool, pictures: Sequence[tuple[str,
         lines += ["**A quick run on short logs: the goals are for long ones.**", ""]
     for caption, picture in pictures:
         lines += [f"![{caption}]({picture})", ""]
+    lines += missed(sections)
     for section in sections:
         lines += [f"## {section.title}", "", "| what | ours | rival | rival takes | ratio | goal | reached |"]
         lines.append("|---|--:|---|--:|--:|--:|---|")
@@ -276,6 +284,18 @@ def page(sections: Sequence[Section], quick: bool, pictures: Sequence[tuple[str,
         *parts,
     ]
     return "\n".join(lines).rstrip() + "\n"
+
+
+def missed(sections: Sequence[Section]) -> list[str]:
+    """Return the lines on goals that are not reached: by how much, and what limits them; none where all are."""
+    yardstick_s = statistics.median(yardsticks(sections))
+    found = [
+        f"- {row.what} ({row.rival}): {row.ratio:.3g} where {row.goal} is asked for.{row.limit and f' {row.limit}'}"
+        for section in sections
+        for row in judged(section, yardstick_s)
+        if row.reached is False
+    ]
+    return ["## Goals that are missed, and what limits them", "", *found, ""] if found else []
 
 
 def _page_time(took_s: float, yardstick_s: float) -> str:

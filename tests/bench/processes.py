@@ -54,6 +54,8 @@ def _run(arguments: Sequence[str], environment: Mapping[str, str] | None, progra
     return took, int(run.stderr.split()[-1]) * 1024, run.stderr
 
 
+LARGEST = 3
+"""Steps that are named of what limits a command."""
 SHOWN = 8
 """Functions that are listed by the time that they take."""
 LEAST_SHARE = 0.01
@@ -95,6 +97,22 @@ class Sampled:
     looks_s: float
     loops_s: float
 
+    @property
+    def largest(self) -> str:
+        """The steps that take most, as a sentence."""
+        most = sorted(self.steps.items(), key=lambda one: -one[1])[:LARGEST]
+        return f"Its largest steps are {', '.join(f'{step} ({duration(took)})' for step, took in most)}."
+
+    @property
+    def limit(self) -> str:
+        """What it could be with all cores busy throughout, and what takes most, as sentences."""
+        return f"With all cores busy throughout, its processor time would take {duration(self.busy_s)}. {self.largest}"
+
+    @property
+    def busy_s(self) -> float:
+        """What it would take if all cores were busy throughout [s]."""
+        return self.processor_s / (os.cpu_count() or 1)
+
     def where(self, what: str) -> str:
         """Return where the time went, as sentences; `what` is the command."""
         shown = {step: took for step, took in self.steps.items() if took >= LEAST_SHARE * self.took_s}
@@ -109,7 +127,7 @@ class Sampled:
             f"Where the {duration(self.took_s)} of {what} go, by {self.looks} looks at the main thread, which took "
             f"{duration(self.looks_s)}: {parts}, the rest {duration(rest_s)}. All of its threads and processes take "
             f"{duration(self.processor_s)} of processor time: with {cores} cores busy throughout it would take "
-            f"{duration(self.processor_s / cores)}.{loops} By function, with what it calls outside ferryid: {names}."
+            f"{duration(self.busy_s)}.{loops} By function, with what it calls outside ferryid: {names}."
         )
 
 
@@ -144,28 +162,33 @@ def middle(runs: Sequence[Sampled]) -> Sampled:
     return replace(sorted(runs, key=lambda run: run.took_s)[len(runs) // 2], peak=max(run.peak for run in runs))
 
 
-def floor(what: str, run: Sampled, packages: Sequence[str], repeats: int = 3) -> str:
-    """Return where a command's time goes, and what of it nothing of ferryid can save, as sentences.
+@dataclass(frozen=True)
+class Imports:
+    """A process that only imports packages: their names, and what it takes [s]."""
 
-    Parameters
-    ----------
-    what
-        The command.
-    run
-        It, measured.
-    packages
-        What any program for this would import.
-    repeats
-        How often their import is measured; the median counts.
-    """
+    packages: Sequence[str]
+    took_s: float
+
+    def floor(self, what: str, run: Sampled) -> str:
+        """Return where a command's time goes, and what of it nothing of ferryid can save, as sentences."""
+        return f"{run.where(what)} {self.says} ({self.took_s / run.took_s:.0%})."
+
+    @property
+    def says(self) -> str:
+        """What it takes, as the beginning of a sentence."""
+        return f"A process that only imports {', '.join(self.packages)} takes {duration(self.took_s)}"
+
+    def limit(self, run: Sampled, allowed_s: float) -> str:
+        """Return what limits a command that may take so long [s], as sentences."""
+        return f"{self.says}, of the {duration(allowed_s)} that the goal comes to. {run.largest}"
+
+
+def imports(packages: Sequence[str], repeats: int = 3) -> Imports:
+    """Measure the import of what any program of a kind would import, so often; the median counts."""
     bare = [sys.executable, "-c", f"import {', '.join(packages)}"]
     alone = []
     for _ in range(repeats):
         start = time.perf_counter()
         subprocess.run(bare, check=True)
         alone.append(time.perf_counter() - start)
-    import_s = statistics.median(alone)
-    return (
-        f"{run.where(what)} A process that only imports {', '.join(packages)} takes {duration(import_s)} "
-        f"({import_s / run.took_s:.0%})."
-    )
+    return Imports(packages, statistics.median(alone))

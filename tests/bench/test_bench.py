@@ -78,6 +78,34 @@ def test_the_page_says_how_other_work_compares_with_the_yardstick() -> None:
     assert "easier to reach than it was there for work of the first kind, and harder to reach than it was there" in said
 
 
+def test_the_page_begins_with_what_is_missed_and_what_limits_it() -> None:
+    slow = Row("2 h", "1 s", "rosbags", "20 s", 20.0, "≥ 35", reached=False, limit="Decompressing alone is 63 times.")
+    rows = [slow, Timed("fit", 2.9, 1.5, limit="Not shown."), Timed("simulate", 3.1, 1.5, limit="Importing takes 1 s.")]
+    said = page([Section("A", rows, yardstick_s=[2 * yardstick.GOALS_S])], quick=False)
+    listed = said.partition("## Goals that are missed, and what limits them\n\n")[2].partition("\n\n## A")[0]
+    assert listed.splitlines() == [
+        "- 2 h (rosbags): 20 where ≥ 35 is asked for. Decompressing alone is 63 times.",
+        "- simulate (the yardstick): 1.14 where ≤ 1.1 (1.5 s) is asked for. Importing takes 1 s.",
+    ]
+    reached = page([Section("A", rows[1:2], yardstick_s=[2 * yardstick.GOALS_S])], quick=False)
+    assert "Goals that are missed" not in reached
+
+
+def test_what_limits_a_reading_is_not_what_the_least_work_has_too() -> None:
+    steps = {
+        "decompressing": 9.0,
+        "clocks": 0.5,
+        "writing": 8.0,
+        "copying wanted fields": 2.0,
+        "the rest": 1.0,
+        "x": 0.1,
+    }
+    said = ingest.largest(steps)
+    assert said.endswith("goes into copying wanted fields (2 s), the rest (1 s), clocks (500 ms).")
+    assert "copying wanted fields 2 s, the rest 1 s" in ingest.between(steps)
+    assert "x 100 ms" not in ingest.between(steps)
+
+
 @pytest.mark.parametrize(("took_s", "judged"), [(1700.0, "reached"), (1900.0, "**missed**")])
 def test_the_time_of_the_page_is_judged_by_the_yardstick_too(took_s: float, judged: str) -> None:
     parts = [
