@@ -185,16 +185,24 @@ def osaka() -> str:
     seconds = [one.seconds for one in lags]
     by_log = dict(zip(random.names, seconds, strict=True))
     measured = dict(zip(random.names, random.measured, strict=True))
+    paths = {Path(path).stem: path for path in esso.logs("random")}
 
     def judge(one: Diagnosis, finding: Finding) -> str:
         if finding.effect == "wind":
             parts = zip(("north", "east"), measured[one.log].tolist(), strict=True)
             return " ".join(agrees(finding.parameters[way], value, 0.0) for way, value in parts)
+        if finding.effect == "gusts":
+            gusty = witnesses.gustiness(read_measurements(paths[one.log], profile)[0])
+            parts = (("std", gusty.std), ("time_constant", gusty.seconds))
+            return " ".join(agrees(finding.parameters[name], value, 0.0) for name, value in parts)
         if finding.effect == "clock_offset":
             # Positive where positions are late; the witness is good to a row either way.
             return agrees(finding.parameters["seconds"], -by_log[one.log], 0.1)
         if finding.effect == "held_samples" and "north, east, heading" in finding.says:
             return "Defended: position and heading repeat together."
+        if finding.effect == "held_samples" and finding.says.endswith("(heading)."):
+            held_s = witnesses.repeated(pd.read_csv(paths[one.log]), "psi_hat [rad]")
+            return f"Defended: the rows hold one heading for up to {held_s:.1f} s."
         if finding.effect in ("lever_arm", "payload", "thruster_gain"):
             return "Doubtful: what belongs to the vessel would show in all of its runs."
         return UNJUDGED

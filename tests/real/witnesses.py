@@ -70,6 +70,32 @@ def slow_gain(measurements: Measurements, below_hz: float = 0.06) -> Floats:
     return np.array(gains)
 
 
+@dataclass(frozen=True)
+class Gustiness:
+    """How a measured wind varies: of both components together [m/s], and until its autocorrelation is 1/e [s]."""
+
+    std: float
+    seconds: float
+
+
+def gustiness(measurements: Measurements) -> Gustiness:
+    """Return how the wind of an anemometer varies about the mean of the recording."""
+    assert measurements.wind is not None
+    wind = measurements.wind[measurements.usable]
+    away = wind - wind.mean(axis=0)
+    size = np.fft.rfft(away, 2 * len(away), axis=0)
+    alike = np.fft.irfft(np.sum(np.abs(size) ** 2, axis=1))[: len(away)]
+    below = np.flatnonzero(alike < alike[0] / np.e)
+    return Gustiness(float(np.sqrt(np.mean(away**2))), float(below[0]) * measurements.step_s)
+
+
+def repeated(table: pd.DataFrame, column: str) -> float:
+    """Return the longest time for which a column of a table repeats its value exactly [s]."""
+    times, values = table.iloc[:, 0].to_numpy(), table[column].to_numpy()
+    changes = np.flatnonzero(np.diff(values) != 0.0)
+    return float(np.diff(times[changes]).max())
+
+
 def antenna(folder: Path) -> Floats:
     """Return where milliAmpère's receiver stands, seen from the origin of the ferry's own navigation [m], x and y."""
     fix, pose = (_stamped(folder / name) for name in ("vectorVS330/fix.csv", "navigation/pose.csv"))

@@ -71,6 +71,8 @@ class Figures:
         True where it sets in or ends within the log as an event that no hull explains, however far that is off.
     beyond_hull
         True where it acts all along and stands out against all that a hull, however far off, or another effect explains.
+    deviations
+        Size in standard errors of it, of the parameter of which it is most.
     doubt
         Why its values are not credible, as the end of a sentence; empty where they are.
     """
@@ -96,6 +98,7 @@ class Figures:
     beyond_feedback: bool = False
     sets_in: bool = False
     beyond_hull: bool = False
+    deviations: float = 0.0
     doubt: str = ""
 
 

@@ -271,9 +271,15 @@ def worse_altogether(finding: Finding, context: Context, threshold: float) -> Ou
 
 @rule(JUDGING.least_removed, "of the held-out squared force error", of_name=True)
 def removes_little(finding: Finding, context: Context, threshold: float) -> Outcome:
-    """Lower what removes less than this on every axis while it acts: hull and formulas may be as much off."""
+    """Lower what removes less than this on every axis while it acts: hull and formulas may be as much off.
+
+    Not what is many standard errors away from nothing beside a hull model that holds the hull: how much that removes is a
+    matter of how often thrusters are in their dead band, say, and not of what it is.
+    """
     removed = context.own.removed
     if not finding.sure or not removed or max(removed.values()) >= threshold:
+        return finding, ""
+    if context.log.hull_known and not context.log.joint and context.own.deviations >= JUDGING.certain_size:
         return finding, ""
     return _because(
         finding,

@@ -228,6 +228,27 @@ def interval_doubt(
     return "its 95 % interval includes no effect at all" if none else ""
 
 
+def size_deviations(parameters: Sequence[Parameter], estimates: Mapping[str, Estimate]) -> float:
+    """Return by how many standard errors a size is away from none, of the parameter of which it is most; places have no size.
+
+    Parameters
+    ----------
+    parameters
+        Of the effect, with the values at which it does nothing.
+    estimates
+        Those that are reported, by name.
+    """
+    found = [0.0]
+    for one in parameters:
+        if one.name not in estimates or one.unit != parameters[0].unit:
+            continue
+        told = estimates[one.name]
+        half = told.value - told.low if told.value > one.neutral else told.high - told.value
+        if half > 0.0:
+            found.append(float(ndtri(0.975)) * abs(told.value - one.neutral) / half)
+    return max(found)
+
+
 def _confined(one: Parameter) -> bool:
     return one.high - one.low <= JUDGING.confined * one.size
 

@@ -24,7 +24,13 @@ from ferryid.diagnose.inference.folds import block_s
 from ferryid.diagnose.inference.onset_estimation import lasts_s, replace_candidate
 from ferryid.diagnose.judging.backward_elimination import Elimination
 from ferryid.diagnose.judging.claims import Claim, Figures
-from ferryid.diagnose.judging.credibility import idle_actuators, interval_doubt, scaled_as_masses, value_doubt
+from ferryid.diagnose.judging.credibility import (
+    idle_actuators,
+    interval_doubt,
+    scaled_as_masses,
+    size_deviations,
+    value_doubt,
+)
 from ferryid.diagnose.judging.experiment_design import manoeuvre
 from ferryid.diagnose.judging.figure_data import figure_columns, figure_regressor
 from ferryid.diagnose.judging.finding import Finding, Rival
@@ -133,7 +139,11 @@ def _force_claim(
     figures = _figures(problem, candidate, values, reported, proof, removed)
     ends = {name: (one.low, one.high) for name, one in estimates.items()}
     doubt = idle_actuators(problem, kept) or figures.doubt or candidate.effect.doubt_of_ends(ends)
-    figures = replace(figures, doubt=doubt or interval_doubt(candidate.parameters, estimates, kept.covariance(i)))
+    figures = replace(
+        figures,
+        doubt=doubt or interval_doubt(candidate.parameters, estimates, kept.covariance(i)),
+        deviations=size_deviations(candidate.parameters, estimates),
+    )
     if proof is not None and candidate.effect.out_of_step:
         beyond = proof.improvement.score_low > feedback_of(problem, kept).high
         figures = replace(figures, beyond_feedback=beyond)

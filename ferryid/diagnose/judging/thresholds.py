@@ -282,6 +282,12 @@ class JudgingThresholds:
         "held-out error that a finding must remove on some axis while it acts",
         "tuned on cases of `ferryid prove`: clean logs named small inflow losses and currents",
     )
+    certain_size: float = threshold(
+        7.0,
+        "standard errors",
+        "size from which on, beside the hull model of a profile, it does not matter how little a finding removes",
+        "tuned on cases of `ferryid prove`: wrong names that remove little are of up to 5.6, dead bands and offsets of more",
+    )
     idle_share: float = threshold(
         0.1,
         "of the recorded force",

@@ -273,6 +273,17 @@ def test_what_removes_hardly_anything_of_the_error_is_a_hint() -> None:
     )
 
 
+def test_how_little_is_removed_does_not_matter_of_a_certain_size_beside_a_hull_model() -> None:
+    """A dead band of sixteen standard errors removed 9 % of the error in yaw, as thrusters were seldom in it."""
+    certain = replace(on("force", removed={"yaw": 0.09}), log=LogFigures(hull_known=True))
+    for deviations, sure in ((6.9, False), (7.0, True)):
+        context = replace(certain, own=replace(certain.own, deviations=deviations))
+        assert stands(removes_little, found("dead_band"), context) == sure
+        # What the hull is known from may have made the size.
+        for log in (LogFigures(hull_known=False), LogFigures(hull_known=True, joint=True)):
+            assert not stands(removes_little, found("dead_band"), replace(context, log=log))
+
+
 def term() -> LawTerm:
     return LawTerm("sway", "v", Estimate(1.0, 0.5, 1.5, "kg/s"), "")
 

@@ -29,6 +29,7 @@ from ferryid.diagnose.judging.credibility import (
     interval_doubt,
     refitted_hull,
     scaled_as_masses,
+    size_deviations,
     unfelt,
     value_doubt,
 )
@@ -513,3 +514,16 @@ def test_what_is_learned_becomes_the_current_model_unless_a_doubt_holds_for_it(
     assert done.model is not None
     assert json.loads(Path(done.model).read_text("utf-8"))["accepted"] == current
     assert any("does not become the current one" in one for one in done.notes) != current
+
+
+def test_a_size_is_so_many_standard_errors_away_from_nothing() -> None:
+    """Of the parameter that is most of it, by the end of its interval that is towards nothing; a place is no size."""
+    band, cut = Estimate(80.0, 80.0 - 5.0 * 1.96, 200.0, "rpm"), Estimate(0.8, 0.0, 0.8 + 0.05 * 1.96, "-")
+    dead_band, gain, load = (effects()[name].parameters_of(FERRY) for name in ("dead_band", "thruster_gain", "payload"))
+    assert size_deviations(dead_band, {"ahead": band}) == pytest.approx(16.0, rel=1e-3)
+    assert size_deviations(dead_band, {"ahead": band, "astern": replace(band, value=0.0)}) == pytest.approx(
+        16.0, rel=1e-3
+    )
+    assert size_deviations(gain, {"factor": cut}) == pytest.approx(4.0, rel=1e-3)
+    assert size_deviations(load, intervals(mass=(0.0, 300.0), x=(1.9, 2.1))) == pytest.approx(1.96, rel=1e-3)
+    assert size_deviations(load, {}) == 0.0
