@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from ferryid.diagnose.data.measurements import read_measurements, window_lengths
 from ferryid.diagnose.inference.estimation import Candidate, estimation_problem
-from ferryid.diagnose.inference.needed_correction import needed, too_light
+from ferryid.diagnose.inference.needed_correction import needed, why_too_light
 from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.diagnose.inference.search import search
 from ferryid.diagnose.inference.weak_form import windows
@@ -47,7 +48,7 @@ def test_the_weak_thruster_is_named_beside_the_hull(tmp_path: Path, thruster: st
     profile = load_profile(str(made.profile))
     seen = windows(read_measurements(str(made.log), profile)[0], *window_lengths(profile))
     problem = estimation_problem(seen, *prior_force_model(seen.measurements, profile))
-    assert too_light(problem)
+    assert "0.4" in why_too_light(profile)
     known = [Candidate.of(effects()["hull_parameters"], None, profile)]
     known += [Candidate.of(effects()["thruster_gain"], one.name, profile) for one in profile.actuators]
     found = search(problem, no_progress, known=known)
@@ -61,15 +62,22 @@ def test_what_no_hull_has_is_less_than_its_rigid_body(tmp_path: Path) -> None:
     """Less on one axis alone; a spread that the profile calls unknown is no hull model to correct."""
     problem = trial_on(sailed(tmp_path, "calm", CALM, 1))
     coefficients = Candidate.of(effects()["hull_parameters"], None, FERRY)
-    assert not too_light(problem)
+    assert why_too_light(FERRY) == ""
     assert not needed(problem, coefficients)
     for place, mass in enumerate((FERRY.hull.mass_kg, FERRY.hull.mass_kg, None, None, FERRY.hull.inertia_z)):
         if mass is not None:
             hull = problem.plain.hull.copy()
             hull[place] = 0.7 * mass
             light = replace(problem, plain=replace(problem.plain, hull=hull))
-            assert too_light(light)
             assert needed(light, coefficients)
             assert not needed(light, Candidate.of(effects()["payload"], None, FERRY))
             hull[place] = 20.0 * mass
-            assert not too_light(replace(problem, plain=replace(problem.plain, hull=hull)))
+            assert not needed(replace(problem, plain=replace(problem.plain, hull=hull)), coefficients)
+
+
+def test_a_campaign_says_that_the_profile_is_too_light() -> None:
+    hull = FERRY.hull
+    light = replace(FERRY, hull=replace(hull, M=hull.M * np.diag([0.3, 1.0, 1.0])))
+    share = 0.3 * hull.M[0, 0] / hull.mass_kg
+    assert f"less than its rigid body's ({share:.2g} in surge), as no hull's is" in why_too_light(light)
+    assert why_too_light(replace(light, hull=replace(light.hull, spread=np.inf))) == ""
