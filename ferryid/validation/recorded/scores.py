@@ -520,7 +520,7 @@ def _missed(result: CaseResult, plain: CaseResult) -> Missed:
         case.size / case.oracle_size,
         case.size / case.distinct_size if case.distinct_size else 0.0,
         outcome_of_missed(difference(result, plain), key),
-        why_missed(result, key),
+        why_missed(result, key) or ("smaller than the distinct size" if case.size < case.distinct_size else ""),
         tuple(dict.fromkeys(label(one.key) if not one.hint else f"{label(one.key)}, a hint" for one in new)),
     )
 
