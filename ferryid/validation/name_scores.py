@@ -214,7 +214,7 @@ def _why_not_found(result: CaseResult, key: Key) -> str:
             what = part.partition(", record ")[0].lower()
             mine = what.partition(name)[2].partition(")")[0]
             if name in what and (instance is None or instance.lower() in re.split(r"[(,\s]+", mine)):
-                return "at its usual size it would not have shown in this log"
+                return "an effect of its usual size would not have shown in this log"
     return ""
 
 

@@ -278,7 +278,7 @@ def test_why_effects_of_twice_the_oracles_size_were_missed_stands_on_the_page() 
         ),
         (
             ["To make sure: for payload and thruster force (aft, port), record turns."],
-            "at its usual size it would not have shown in this log",
+            "an effect of its usual size would not have shown in this log",
         ),
         (["To make sure: for thruster force (aft, starboard), record turns; for dead band (port), record steps."], ""),
         (["Not tested: dead band, since there is none."], ""),
@@ -303,6 +303,23 @@ def test_what_is_smaller_than_the_distinct_size_needs_no_other_reason() -> None:
     sizes = {"size": 0.2, "oracle_size": 0.1}
     results = [plain([]), *(case((weak,), [], **sizes, distinct_size=one) for one in (0.3, 0.1))]
     assert [one.why for one in score_recorded(results, []).missed] == ["smaller than the distinct size", ""]
+
+
+def test_what_the_recording_has_of_an_effect_may_cancel_it() -> None:
+    weak, late = Truth("thruster_gain", "port", {"factor": 0.8}), Truth("time_delay", None, {"seconds": 0.2})
+    sizes = {"size": 0.2, "oracle_size": 0.1, "distinct_size": 0.1}
+    results = [plain([]), case((weak,), [], **sizes), case((late,), [], **sizes)]
+
+    def why(factor: float, seconds: float) -> list[str]:
+        forces = {("a", weak.key): factor, ("a", late.key): seconds}
+        return [one.why for one in score_recorded(results, [], None, forces).missed]
+
+    # A factor of 1.1 by itself makes 0.88 of 0.8, and a delay that is negative goes off the other.
+    assert why(1.1, -0.15) == [
+        "the recording as it was has 1.1 of it by its best estimate, which leaves 1.2 times the oracle's size",
+        "the recording as it was has -0.15 of it by its best estimate, which leaves 0.5 times the oracle's size",
+    ]
+    assert why(0.9, 0.15) == ["", ""]
 
 
 @pytest.mark.parametrize(
