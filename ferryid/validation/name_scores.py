@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
@@ -9,7 +10,7 @@ from typing import ClassVar
 from scipy.stats import beta
 
 from ferryid.effects import effects
-from ferryid.effects.wording import IS_A_HINT, titled
+from ferryid.effects.wording import IS_A_HINT, listed, titled
 from ferryid.json_record import Record
 from ferryid.validation.records import UNKNOWN, CaseResult, Finding, Key
 
@@ -24,6 +25,12 @@ NOT_CONFIRMED, NO_HULL_MODEL = "not confirmed: ", "The profile has no hull model
 """How a finding of a campaign says why it is a hint, and how the note begins that makes findings of a single log hints."""
 DROPPED = " considered, but dropped: "
 """What stands in a note between an effect and why it is none."""
+NOT_TESTED, SINCE = "Not tested: ", ", since "
+"""How a note begins on effects that were not tested, and what stands before the reason."""
+UNFOLLOWED = "What is found of forces in such a log means little."
+"""Part of a note on a log whose vessel does not follow its actuators."""
+SMALLEST, TO_SHOW = "Would have been seen with an even chance, from: ", "To make sure: "
+"""What stands before the least sizes that a comparison of groups shows, and before what would show an effect."""
 
 
 @dataclass(frozen=True)
@@ -155,9 +162,7 @@ def outcome_of_missed(result: CaseResult, key: Key) -> str:
         return REFUSED
     if any(one.key == key and one.hint for one in diagnosis.findings):
         return "a hint"
-    effect = effects().get(key[0])
-    title = key[0] if effect is None else titled(effect.title, key[1])
-    if any("but dropped" in note and title.lower() in note.lower() for note in diagnosis.notes):
+    if any("but dropped" in note and _title(key).lower() in note.lower() for note in diagnosis.notes):
         return "dropped"
     other = first_name(result)
     return other if other in (UNKNOWN, NONE, OTHER) else f"taken for {other}"
@@ -165,8 +170,7 @@ def outcome_of_missed(result: CaseResult, key: Key) -> str:
 
 def why_missed(result: CaseResult, key: Key) -> str:
     """Return why an effect that is in the log of a case was not named, in the diagnosis's words; empty where it has none."""
-    effect = effects().get(key[0])
-    title = key[0] if effect is None else titled(effect.title, key[1])
+    title = _title(key)
     hints = [one for one in result.diagnosis.findings if one.key == key and one.hint]
     reasons = [one.says.partition(NOT_CONFIRMED)[2].strip(" .:") for one in hints]
     for note in result.diagnosis.notes:
@@ -179,7 +183,39 @@ def why_missed(result: CaseResult, key: Key) -> str:
     # This makes hints of findings; why there is none at all, or something without a name, it does not say.
     if hints and not any(reasons) and any(note.startswith(NO_HULL_MODEL) for note in result.diagnosis.notes):
         reasons.append("the hull was fitted to the same log, as the profile has none")
-    return "; ".join(dict.fromkeys(filter(None, reasons)))
+    return "; ".join(dict.fromkeys(filter(None, reasons))) or _why_not_found(result, key)
+
+
+def _title(key: Key) -> str:
+    effect = effects().get(key[0])
+    return key[0] if effect is None else titled(effect.title, key[1])
+
+
+def _why_not_found(result: CaseResult, key: Key) -> str:
+    """Return why a diagnosis does not mention an effect by itself: what it says of others, and of what its logs can show."""
+    undecided = [_title(one.key).lower() for one in result.diagnosis.findings if key[0] in one.unresolved_with]
+    if undecided:
+        return f"not distinguished from {listed(list(dict.fromkeys(undecided)))}"
+    name, instance = _title((key[0], None)).lower(), key[1]
+    for note in result.diagnosis.notes:
+        if note.startswith(NOT_TESTED):
+            what, _, why = note.removeprefix(NOT_TESTED).partition(SINCE)
+            if name in what.lower():
+                return f"not tested, since {why.removesuffix('.')}"
+        if UNFOLLOWED in note:
+            return "the vessel hardly follows the applied force in this log"
+        if note.startswith(SMALLEST):
+            parts = (one.partition(", ") for one in note.removeprefix(SMALLEST).removesuffix(".").split("; "))
+            least = [size for what, _, size in parts if what.lower() == _title(key).lower()]
+            if least:
+                return f"the logs show it with an even chance from {listed(least)} on"
+        _, found, rest = note.partition(TO_SHOW)
+        for part in rest.split("; ") if found else ():
+            what = part.partition(", record ")[0].lower()
+            mine = what.partition(name)[2].partition(")")[0]
+            if name in what and (instance is None or instance.lower() in re.split(r"[(,\s]+", mine)):
+                return "an effect of its usual size would not have shown in this log"
+    return ""
 
 
 def first_name(result: CaseResult) -> str:

@@ -25,6 +25,7 @@ from ferryid.validation.recorded.drives import drives
 from ferryid.validation.recorded.effects import SENSOR, Concealment, concealments
 from ferryid.validation.recorded.effects.thruster_interaction import left_by
 from ferryid.validation.recorded.effects.waves import series
+from ferryid.validation.recorded.given_back import left_over
 from ferryid.validation.recorded.hull import current_load, damping, wind_load
 from ferryid.validation.recorded.log import RecordedLog
 from ferryid.validation.recorded.signal_values import with_columns
@@ -256,6 +257,17 @@ def test_a_propeller_behind_which_a_rudder_stands(tmp_path: Path) -> None:
     assert np.array_equal(after.columns["delta_propeller"], log.columns["delta_propeller"])
     # The rudder feels what acts, in the record and in the library alike.
     assert explained(log, reread(after, tmp_path), "thruster_gain", {"factor": 0.8}, "propeller") < 0.01
+
+
+@pytest.mark.parametrize(("steps", "other"), [(False, (0.0, 0.35)), (True, (0.5, np.inf))])
+def test_a_rudder_that_is_ordered_in_steps_cannot_lag(steps: bool, other: tuple[float, float], tmp_path: Path) -> None:
+    log, lag = tanker(), {"time_constant": 0.5}
+    if steps:
+        helm = np.radians(35.0) * np.sign(np.sin(0.7 * log.times("table")))
+        log = written(log.changed({"delta_propeller": helm}), tmp_path)
+    # No angle makes up for a rudder that was at once where it was ordered to: its force is bounded.
+    left = left_over(log, altered(log, "thruster_lag", lag), Truth("thruster_lag", None, lag))
+    assert other[0] <= left < other[1]
 
 
 def test_a_gain_from_a_time_on() -> None:

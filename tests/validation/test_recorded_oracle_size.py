@@ -21,6 +21,7 @@ from ferryid.validation.recorded.manifest import Recording
 from ferryid.validation.recorded.oracle_size import (
     APART,
     Baseline,
+    _along,
     _beside,
     _gain_of_noise,
     distinctness,
@@ -47,6 +48,16 @@ def test_what_the_hull_takes_up_is_not_seen() -> None:
     assert _beside(own, hull) == pytest.approx(np.linalg.norm(across), rel=1e-3)
     # A hull that is known takes up nothing.
     assert _beside(own, 0.0 * hull) == pytest.approx(np.linalg.norm(own))
+
+
+def test_what_a_formula_does_not_do_is_no_evidence_of_it() -> None:
+    rng = np.random.default_rng(2)
+    hull, load, noise = 1e3 * rng.standard_normal((2000, 3)), rng.standard_normal(2000), 5.0 * rng.standard_normal(2000)
+    formula = load + 0.3 * hull[:, 0]
+    assert _along(formula, formula, hull) == pytest.approx(_beside(formula, hull))
+    # Ten times as long, and as much of the load as before.
+    assert _beside(formula + noise, hull) > 4.0 * _beside(formula, hull)
+    assert _along(formula + noise, formula, hull) == pytest.approx(_beside(formula, hull), abs=3.0 * 5.0)
 
 
 def test_noise_of_known_spectrum_gains_by_its_power() -> None:
@@ -103,6 +114,18 @@ def test_a_size_is_distinct_from_what_looks_alike_beside_any_hull(tmp_path: Path
 
 
 @pytest.mark.slow
+def test_the_only_actuator_is_as_strong_as_a_hull_that_nobody_modelled_is_light(tmp_path: Path) -> None:
+    log = read_log(str(zigzag(tmp_path / "tank.dat", 120.0)), load_profile("kvlcc2-model"))
+    every = [Baseline(log, _Log(log.measurements).trial)]
+    gain, weak = concealments()["thruster_gain"], Truth("thruster_gain", "propeller", {"factor": 0.6})
+    assert distinctness(gain, every, weak) < 0.1 * visibility(gain, every, weak)
+    # Before it was weak, or in other logs, it shows how strong it was.
+    assert distinctness(gain, every, replace(weak, onset_s=40.0)) > 0.1 * visibility(
+        gain, every, replace(weak, onset_s=40.0)
+    )
+
+
+@pytest.mark.slow
 def test_a_short_lag_looks_like_a_delay() -> None:
     lag, (own,) = concealments()["thruster_lag"], baseline()
 
@@ -148,6 +171,7 @@ def test_an_error_that_nothing_shows_has_no_size(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_two_effects_are_concealed_one_after_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(case_sampling, "baselines", lambda logs, vessel: baseline())
+    monkeypatch.setattr(case_sampling, "unfollowed", lambda path, vessel: "")
     recording = Recording("ferry", ("short.bag",), "milliampere")
     (case,) = case_sampling._of_pair(recording, [ferry()], ("thruster_gain", "time_delay"), 3, 1.0)
     assert [one.effect for one in case.truths] == ["thruster_gain", "time_delay"]
@@ -165,3 +189,16 @@ def test_two_effects_are_concealed_one_after_the_other(monkeypatch: pytest.Monke
     # A recording that is asked for one of them alone has no pair.
     alone = replace(recording, only=("payload",))
     assert case_sampling._of_pair(alone, [ferry()], ("payload", "wind"), 3, 1.0) == []
+
+
+def test_what_forces_alone_show_is_not_concealed_where_the_vessel_does_not_follow_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    recording = Recording("ferry", ("short.bag",), "milliampere")
+    monkeypatch.setattr(case_sampling, "unfollowed", lambda path, vessel: "they move it by 0.02 times what is expected")
+    (none,) = case_sampling._of_effect(recording, [ferry()], concealments()["thruster_gain"], 3, 0.2, ())[1]
+    assert none.why.endswith(": only forces would show it, and they move it by 0.02 times what is expected.")
+    # The positions tell where the antenna is, whatever moves the vessel.
+    assert case_sampling._unfollowed(recording, [ferry()], concealments()["lever_arm"]) == ""
+    monkeypatch.setattr(case_sampling, "unfollowed", lambda path, vessel: "")
+    assert case_sampling._unfollowed(recording, [ferry()], concealments()["thruster_gain"]) == ""

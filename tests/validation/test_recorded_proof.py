@@ -11,12 +11,22 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ferryid.diagnose import judging
+from ferryid import diagnose
 from ferryid.errors import FerryIdError
 from ferryid.validation import stages
 from ferryid.validation.case import Case, Truth
 from ferryid.validation.commitment import verified_answers
-from ferryid.validation.name_scores import DROPPED, NO_HULL_MODEL, NOT_CONFIRMED
+from ferryid.validation.name_scores import (
+    DROPPED,
+    NO_HULL_MODEL,
+    NOT_CONFIRMED,
+    NOT_TESTED,
+    SINCE,
+    SMALLEST,
+    TO_SHOW,
+    UNFOLLOWED,
+    why_missed,
+)
 from ferryid.validation.recorded.case_sampling import NotMade
 from ferryid.validation.recorded.evaluators import recorded_pipeline
 from ferryid.validation.recorded.log import read_log
@@ -183,6 +193,7 @@ def test_what_counts_is_the_difference() -> None:
     lacking = [
         NotMade("a", "wind", 0.0, "wind cannot be concealed in a: no areas."),
         *(NotMade("a", "payload", size, "payload: 4 % of the rows cannot express it, as so.") for size in (0.3, 0.5)),
+        NotMade("a", "thruster_lag", 0.7, "thruster_lag of 0.7 s was not made in a: by the record another one."),
         NotMade("b", "", 0.0, "b.bag: too short. Fix: none"),
     ]
     scores = score_recorded(results, lacking)
@@ -204,8 +215,8 @@ def test_what_counts_is_the_difference() -> None:
     text = page(RUN, scores)
     assert "| a | boat | explained | 2 | time_delay | mooring |" in text
     assert (
-        "- a: wind (no areas); payload of 0.3 and 0.5 share of the mass (more than 2 % of the rows cannot express it, as so)."
-        in text
+        "- a: wind (no areas); payload of 0.3 and 0.5 share of the mass (more than 2 % of the rows cannot express it, as so);"
+        " thruster_lag of 0.7 s (by the record another one)." in text
     )
     assert "- b: b.bag: too short. Fix: none." in text
     assert "| Sensors | 60.0 % (3/5)" in text
@@ -256,9 +267,66 @@ def test_why_effects_of_twice_the_oracles_size_were_missed_stands_on_the_page() 
     assert f"| thruster_gain (port) {row}" in text
 
 
-@pytest.mark.parametrize("words", [NOT_CONFIRMED, NO_HULL_MODEL, DROPPED])
+@pytest.mark.parametrize(
+    ("notes", "why"),
+    [
+        (["Not tested: fouling and thruster force, since there is none."], "not tested, since there is none"),
+        (["b.bag: too large. What is found of forces in such a log means little."], "the vessel hardly follows"),
+        (
+            ["Would have been seen with an even chance, from: Payload, mass 3 kg; Thruster force (port), factor 33 %."],
+            "the logs show it with an even chance from factor 33 % on",
+        ),
+        (
+            ["To make sure: for payload and thruster force (aft, port), record turns."],
+            "an effect of its usual size would not have shown in this log",
+        ),
+        (["To make sure: for thruster force (aft, starboard), record turns; for dead band (port), record steps."], ""),
+        (["Not tested: dead band, since there is none."], ""),
+    ],
+)
+def test_what_a_diagnosis_does_not_mention_is_missed_for_what_it_says_of_its_logs(notes: list[str], why: str) -> None:
+    weak = Truth("thruster_gain", "port", {"factor": 0.8})
+    missed = case((weak,), [])
+    noted = replace(missed, diagnosis=replace(missed.diagnosis, notes=tuple(notes)))
+    assert why_missed(noted, weak.key).startswith(why)
+    assert bool(why_missed(noted, weak.key)) == bool(why)
+    # What it was not distinguished from says more.
+    instead = replace(finding("payload", p=0.5), unresolved_with=("thruster_gain",))
+    found = case((weak,), [instead])
+    assert why_missed(replace(found, diagnosis=replace(found.diagnosis, notes=tuple(notes))), weak.key) == (
+        "not distinguished from payload"
+    )
+
+
+def test_what_is_smaller_than_the_distinct_size_needs_no_other_reason() -> None:
+    weak = Truth("thruster_gain", "port", {"factor": 0.8})
+    sizes = {"size": 0.2, "oracle_size": 0.1}
+    results = [plain([]), *(case((weak,), [], **sizes, distinct_size=one) for one in (0.3, 0.1))]
+    assert [one.why for one in score_recorded(results, []).missed] == ["smaller than the distinct size", ""]
+
+
+def test_what_the_recording_has_of_an_effect_may_cancel_it() -> None:
+    weak, late = Truth("thruster_gain", "port", {"factor": 0.8}), Truth("time_delay", None, {"seconds": 0.2})
+    sizes = {"size": 0.2, "oracle_size": 0.1, "distinct_size": 0.1}
+    results = [plain([]), case((weak,), [], **sizes), case((late,), [], **sizes)]
+
+    def why(factor: float, seconds: float) -> list[str]:
+        forces = {("a", weak.key): factor, ("a", late.key): seconds}
+        return [one.why for one in score_recorded(results, [], None, forces).missed]
+
+    # A factor of 1.1 by itself makes 0.88 of 0.8, and a delay that is negative goes off the other.
+    assert why(1.1, -0.15) == [
+        "the recording as it was has 1.1 of it by its best estimate, which leaves 1.2 times the oracle's size",
+        "the recording as it was has -0.15 of it by its best estimate, which leaves 0.5 times the oracle's size",
+    ]
+    assert why(0.9, 0.15) == ["", ""]
+
+
+@pytest.mark.parametrize(
+    "words", [NOT_CONFIRMED, NO_HULL_MODEL, DROPPED, NOT_TESTED, SINCE, UNFOLLOWED, SMALLEST, TO_SHOW]
+)
 def test_reasons_are_found_by_words_that_the_diagnosis_has(words: str) -> None:
-    sources = Path(judging.__file__).parent.glob("*.py")
+    sources = Path(diagnose.__file__).parent.rglob("*.py")
     assert any(words in one.read_text("utf-8") for one in sources)
 
 

@@ -9,7 +9,7 @@ from ferryid.diagnose.inference.estimation import (
     fit,
     fitted_force_model,
 )
-from ferryid.diagnose.inference.motion_responses import motion_responses
+from ferryid.diagnose.inference.motion_responses import VAGUE, motion_responses
 from ferryid.diagnose.inference.noise_estimation import fit_noise_with
 from ferryid.diagnose.inference.noise_model import NoiseModel, likelihood
 from ferryid.diagnose.inference.prior import prior_force_model
@@ -23,6 +23,7 @@ __all__ = [
     "INFERENCE",
     "START_FREQUENCIES",
     "START_STRENGTHS",
+    "VAGUE",
     "Candidate",
     "DisturbanceState",
     "EstimationProblem",

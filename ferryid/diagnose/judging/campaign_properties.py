@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from functools import partial
+from itertools import combinations
 from math import exp, inf
 
 import numpy as np
@@ -189,19 +190,50 @@ class PropertyTest:
 
 def judge_properties(made: CampaignFit, progress: Callable[[str], None]) -> tuple[PropertyTest, ...]:
     """Select lasting properties beside the hull and the conditions of an estimate, and judge each on held-out data."""
-    found, rivals = _one_shape_of_each_curve(*select_properties(made, progress))
+    found, rivals = _one_of_two_that_hide(*_one_shape_of_each_curve(*select_properties(made, progress)))
     return tuple(tested(found, one, rivals.get(one.key, ())) for one in found.campaign.properties)
 
 
 def _one_shape_of_each_curve(made: CampaignFit, rivals: Rivals) -> tuple[CampaignFit, Rivals]:
     """Return an estimate without the weaker of two shapes of a thrust curve that explain the same: it is the other's rival."""
     while shapes := redundant_shape(made.campaign.properties, partial(_evidence_without, made)):
-        weaker, stronger = (made.campaign.properties[place] for place in shapes[:2])
-        odds = _evidence_without(made, {shapes[1]}) - _evidence_without(made, {shapes[0]})
-        others = [one for one in rivals.get(stronger.key, ()) if one.candidate.key != weaker.key]
-        rivals = {**rivals, stronger.key: (*others, TriedProperty(weaker, odds, shapes[2]))}
-        made = without_property(made, weaker)
+        made, rivals = _without_weaker(made, rivals, *shapes)
     return made, rivals
+
+
+def _one_of_two_that_hide(made: CampaignFit, rivals: Rivals) -> tuple[CampaignFit, Rivals]:
+    """Return an estimate without the weaker of a delay and a lag that hide each other: it is the other's rival.
+
+    Their sum is known, and neither of them: while both are estimated, the interval of each holds none of it, though one alone
+    explains nearly what both do. Evidence for both says little there: it does not know by how much the logs disagree.
+    """
+    properties = made.campaign.properties
+    for places in combinations(range(len(properties)), 2):
+        one, other = (properties[place] for place in places)
+        if not alike(one, other, 1.0) or not all(_holds_none(made, each) for each in (one, other)):
+            continue
+        none = _evidence_without(made, set(places))
+        alone = {place: _evidence_without(made, set(places) - {place}) - none for place in places}
+        weaker, stronger = sorted(places, key=lambda place: alone[place])
+        if made.evidence > none and alone[stronger] >= JUDGING.alike_shapes * (made.evidence - none):
+            # Each of a delay and a lag is one of a kind: no other pair is left.
+            return _without_weaker(made, rivals, weaker, stronger, alone[weaker] / alone[stronger])
+    return made, rivals
+
+
+def _holds_none(made: CampaignFit, candidate: Candidate) -> bool:
+    return bool(interval_doubt(candidate.parameters, _estimates(made, candidate), _covariance(made, candidate)))
+
+
+def _without_weaker(
+    made: CampaignFit, rivals: Rivals, weaker_place: int, stronger_place: int, share: float
+) -> tuple[CampaignFit, Rivals]:
+    """Return an estimate without the weaker of two properties, given by their places, which is the other's rival."""
+    weaker, stronger = (made.campaign.properties[place] for place in (weaker_place, stronger_place))
+    odds = _evidence_without(made, {stronger_place}) - _evidence_without(made, {weaker_place})
+    others = [one for one in rivals.get(stronger.key, ()) if one.candidate.key != weaker.key]
+    rivals = {**rivals, stronger.key: (*others, TriedProperty(weaker, odds, share))}
+    return without_property(made, weaker), rivals
 
 
 def _evidence_without(made: CampaignFit, left_out: Set[int]) -> float:
@@ -226,13 +258,7 @@ def tested(made: CampaignFit, candidate: Candidate, rivals: Sequence[TriedProper
         np.sum([np.sum((one @ M.T) ** 2, axis=0) for one, M in zip(loss.errors, masses, strict=True)], axis=0)
         for loss in (before, after)
     ]
-    value, error = _estimate(made, candidate)
-    unreported = frozenset.intersection(*(effect.unreported(one, value) for one in seen))
-    estimates = {
-        one.name: Estimate.normal(float(at), float(e), one.unit, one.low, one.high)
-        for one, at, e in zip(candidate.parameters, value, error, strict=True)
-        if one.name not in unreported and one.size > HELD
-    }
+    estimates = _estimates(made, candidate)
     evidence = made.evidence - without.evidence
     others = [one for one in rivals if one.candidate.key not in {each.key for each in made.campaign.properties}]
     others.sort(key=lambda one: -one.odds)
@@ -277,6 +303,18 @@ def _credibility(made: CampaignFit, candidate: Candidate, estimates: Mapping[str
     without = made.common.copy()
     without[property_rows(made.campaign, candidate)] = 0.0
     return unfelt(felt(made, without, made.own).max(axis=0))
+
+
+def _estimates(made: CampaignFit, candidate: Candidate) -> dict[str, Estimate]:
+    """Return the parameters of a property that mean something."""
+    value, error = _estimate(made, candidate)
+    seen = [member.windows.measurements for member in made.campaign.members]
+    unreported = frozenset.intersection(*(candidate.effect.unreported(one, value) for one in seen))
+    return {
+        one.name: Estimate.normal(float(at), float(e), one.unit, one.low, one.high)
+        for one, at, e in zip(candidate.parameters, value, error, strict=True)
+        if one.name not in unreported and one.size > HELD
+    }
 
 
 def _covariance(made: CampaignFit, candidate: Candidate) -> Floats:

@@ -12,11 +12,13 @@ import numpy as np
 from ferryid.counts import counted
 from ferryid.diagnose.data import window_lengths
 from ferryid.diagnose.inference import INFERENCE, windows
+from ferryid.effects import effects
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.json_record import Record
 from ferryid.validation.case import Case, Truth
 from ferryid.validation.case_sampling import LEVELS, check_runs, numbered
-from ferryid.validation.recorded.effects import Concealed, Concealment, concealments
+from ferryid.validation.recorded.effects import ACTUATOR, Concealed, Concealment, concealments
+from ferryid.validation.recorded.given_back import left_over, unfollowed
 from ferryid.validation.recorded.log import RecordedLog, cached_log
 from ferryid.validation.recorded.manifest import Recording
 from ferryid.validation.recorded.oracle_size import baselines, oracle_size, sizes_in
@@ -45,6 +47,8 @@ TWICE = 2
 """Which of the sizes that is."""
 MOST_MISSED = 0.02
 """Share of the rewritten rows that may lack what expresses an effect."""
+MOST_LEFT = 0.5
+"""Share of the squared change of an actuator's force that the library's effect may leave: more of it is something else then."""
 MOST_REASONS = 4
 """Reasons that an error tells."""
 LATER = (0.3, 0.6)
@@ -198,6 +202,7 @@ def _of_effect(
     if not wanted or (recording.only and one.id not in recording.only):
         return [], []
     why = next((reason for log in logs if (reason := one.cannot(log))), "")
+    why = why or _unfollowed(recording, logs, one)
     if why:
         return [], [NotMade(recording.name, one.id, 0.0, f"{one.id} cannot be concealed in {recording.name}: {why}.")]
     cases, lacking = list[Case](), list[NotMade]()
@@ -213,9 +218,33 @@ def _of_effect(
                 lacking.append(
                     NotMade(recording.name, one.id, case.size, f"{text} the rows cannot express it, as {worst.why}.")
                 )
+            elif (left := _left_over(logs, case)) > MOST_LEFT:
+                text = f"{one.id} of {case.size:.3g} {one.unit} was not made in {recording.name}: by the altered record"
+                text = (
+                    f"{text} {100.0 * left:.0f} % of the squared change of a force is another one than by the effect."
+                )
+                lacking.append(NotMade(recording.name, one.id, case.size, text))
             else:
                 cases.append(case)
     return cases, lacking
+
+
+def _unfollowed(recording: Recording, logs: Sequence[RecordedLog], one: Concealment) -> str:
+    """Return why forces show no effect in a recording whose vessel does not follow its actuators; empty elsewhere."""
+    if any(one.visible is not None and one.visible(log) is not None for log in logs):
+        return ""
+    found = [unfollowed(path, recording.vessel) for path in recording.logs]
+    return f"only forces would show it, and {found[0]}" if all(found) else ""
+
+
+def _left_over(logs: Sequence[RecordedLog], case: Case) -> float:
+    """Return the most that the library's own effect leaves of what is concealed in actuators all along, as a share."""
+    some = [
+        truth
+        for truth in case.truths
+        if concealments()[truth.effect].family == ACTUATOR and truth.effect in effects() and truth.onset_s is None
+    ]
+    return max((left_over(log, concealed(log, one, case.seed).log, one) for one in some for log in logs), default=0.0)
 
 
 def _worst(logs: Sequence[RecordedLog], case: Case) -> Concealed:
@@ -235,7 +264,7 @@ def _of_pair(
     both = [concealments()[name] for name in pair]
     if recording.only and not set(pair) <= set(recording.only):
         return []
-    if any(one.cannot(log) for one in both for log in logs):
+    if any(one.cannot(log) for one in both for log in logs) or any(_unfollowed(recording, logs, one) for one in both):
         return []
     cases = []
     for number in range(max(1, round(runs))):
@@ -251,7 +280,7 @@ def _of_pair(
         case = replace(
             _case(recording, logs, " and ".join(pair), "pair", rng, truths[0], None, IN_PAIRS), truths=tuple(truths)
         )
-        if _worst(logs, case).missed <= MOST_MISSED:
+        if _worst(logs, case).missed <= MOST_MISSED and _left_over(logs, case) <= MOST_LEFT:
             cases.append(replace(case, allowed=tuple(name for one in both for name in one.allowed)))
     return cases
 

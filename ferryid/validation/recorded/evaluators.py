@@ -116,11 +116,13 @@ class _Proof:
         return [one.why for one in self.not_made]
 
     def score(self, results: Sequence[CaseResult]) -> Any:
-        from ferryid.validation.recorded.own_errors import own_errors
-        from ferryid.validation.recorded.scores import score_recorded
+        from ferryid.validation.recorded.own_errors import own_errors, own_forces
+        from ferryid.validation.recorded.scores import is_missed, score_recorded
 
         used = {(one.case.path, one.case.truths[0].effect) for one in results if one.case.truths}
-        return score_recorded(results, self.not_made, own_errors(self.recordings, used))
+        missed = {(one.case.path, one.case.truths[0].key) for one in results if one.case.truths and is_missed(one)}
+        forces = own_forces(self.recordings, missed)
+        return score_recorded(results, self.not_made, own_errors(self.recordings, used), forces)
 
 
 def _targets(scores: Any) -> Any:

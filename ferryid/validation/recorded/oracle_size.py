@@ -3,7 +3,9 @@
 The oracle knows which effect it is, on which thruster, in which direction and from when on, and the noise of the recording as
 it was; only the size is fitted, and the hull beside it within its prior. An effect that changes the whitened prediction errors
 by ``d``, of which the hull takes up what it can, has the log-likelihood ratio ``|d|²/2`` on average. It exceeds the floor of
-one parameter, which chance exceeds in `FALSE_SHARE` of the logs, 19 times in 20 where ``|d|`` is `SIGMAS`.
+one parameter, which chance exceeds in `FALSE_SHARE` of the logs, 19 times in 20 where ``|d|`` is `SIGMAS`. Of ``d`` counts what
+lies along what the library's own formula does: a load that is worked out from a measured motion has the noise of its
+acceleration in it, which is no evidence of a load, and a record has its steps.
 Sensors that err are seen in kinematics likewise, by the standard error of their parameter.
 
 What moves the vessel less than a diagnosis reports is nothing that it is asked for: the size is at least so large. Doses are
@@ -14,7 +16,8 @@ effect over none, and beside it for the effect over each other one of the librar
 a tenth of a second does what a lag of a tenth of a second does. The effect is the likelier of two in `RELIABLE` of the logs
 where what the other leaves of its deviation is `APART` long. Nor is such a one told what form the hull has that nobody
 modelled: the evidence over none is what is left where any force of the motion is free, and in a campaign the current and the
-wind of each log. That is the distinct size; the oracle's stays what doses are multiples of.
+wind of each log. Nor does one know how strong all actuators are together beside such a hull, as a factor on its masses and
+damping does the same. That is the distinct size; the oracle's stays what doses are multiples of.
 """
 
 from __future__ import annotations
@@ -31,9 +34,10 @@ from scipy.stats import norm
 
 from ferryid.cached import cached_property
 from ferryid.diagnose.data import read_measurements
-from ferryid.diagnose.inference import INFERENCE, EstimationProblem, fit, motion_responses
+from ferryid.diagnose.inference import INFERENCE, VAGUE, Candidate, EstimationProblem, fit, motion_responses
 from ferryid.diagnose.judging import candidates_of, response_columns
 from ferryid.effects import effects
+from ferryid.effects.force_model import ForceModel
 from ferryid.types import Floats
 from ferryid.validation.case import Truth
 from ferryid.validation.detection_curves import RELIABLE
@@ -204,7 +208,7 @@ def visibility(one: Concealment, recording: Sequence[Baseline], truth: Truth, be
     """
     change = _change(one, recording, truth)
     hull = np.vstack([base.problem.by_hull for base in (*recording, *before)])
-    deviation = sqrt(2.0 * change.gain) if change.unsteady else _beside(_and_none(change.white, before), hull)
+    deviation = sqrt(2.0 * change.gain) if change.unsteady else _seen(change, before, hull)
     return min(deviation / SIGMAS, change.moved / INFERENCE.void_share, _over_least(one, truth))
 
 
@@ -218,24 +222,42 @@ def distinctness(
     change = _change(one, recording, truth)
     if change.unsteady:
         return visibility(one, recording, truth, before)
-    logs, white = [*recording, *before], _and_none(change.white, before)
-    conditions = _conditions(logs, truth)
+    logs = [*recording, *before]
+    conditions = [*_conditions(logs, truth), *_strength(logs, truth, before, change)]
     # A level that both groups have in common.
     shown = before and any(truth.key in base.responses[0] for base in logs)
     common = [_stacked(logs, [base.responses[0] for base in logs], truth.key)] if shown else []
-    alone = _beside(white, np.hstack([_of_any_hull(logs), *conditions, *common])) / SIGMAS
+    alone = _seen(change, before, np.hstack([_of_any_hull(logs), *conditions, *common])) / SIGMAS
     known, beside = [np.vstack([base.problem.by_hull for base in logs]), *conditions, *common], inf
     none = [dict[Key, Floats]()] * len(before)
     for every in zip(*(base.responses for base in recording), strict=True):
         for key in {key for one in every for key in one} - {truth.key}:
             others = _stacked(logs, [*every, *none], key)
-            beside = min(beside, _beside(white, np.hstack([*known, others])))
+            beside = min(beside, _seen(change, before, np.hstack([*known, others])))
     return min(alone, beside / APART, change.moved / INFERENCE.void_share, _over_least(one, truth))
 
 
 def _and_none(white: Floats, before: Sequence[Baseline]) -> Floats:
     """Return whitened changes of logs with those of logs before them, in which nothing changes."""
     return np.concatenate([white, *(np.zeros(len(base.problem.by_hull)) for base in before)])
+
+
+def _strength(logs: Sequence[Baseline], truth: Truth, before: Sequence[Baseline], change: _Change) -> list[Floats]:
+    """Return what a factor on the force of all actuators does, of any size, beside a hull that nobody modelled, all along.
+
+    Logs before and a time before the effect began show that force as it was.
+    """
+    effect, profile = effects().get(truth.effect), logs[0].log.profile
+    later = truth.onset_s is not None or truth.offset_s is not None
+    if effect is None or not effect.scales or profile.hull.is_known or before or later:
+        return []
+    if len(profile.actuators) == 1:
+        together = np.column_stack(change.formulas)
+    else:
+        every = (base.responses[0].items() for base in logs)
+        each = [np.sum([columns[:, :1] for key, columns in one if key[0] == effect.id], axis=0) for one in every]
+        together = np.vstack(each)
+    return [together * (VAGUE / np.maximum(np.linalg.norm(together, axis=0), 1e-300))]
 
 
 def _of_any_hull(recording: Sequence[Baseline]) -> Floats:
@@ -283,16 +305,21 @@ class _Change:
         Acceleration by it over the measured one, of the channel where that is most.
     unsteady
         Whether it is a random push.
+    formulas
+        What the library's own effect does to the same, where it acts on the record as it was, and on the altered one; none of
+        an effect that the library has not.
     """
 
     white: Floats
     gain: float
     moved: float
     unsteady: bool
+    formulas: tuple[Floats, ...] = ()
 
 
 def _change(one: Concealment, recording: Sequence[Baseline], truth: Truth) -> _Change:
     changed, moved, gain = list[Floats](), 0.0, 0.0
+    formulas: list[list[Floats]] = []
     unsteady = truth.effect in effects() and effects()[truth.effect].unsteady is not None
     for base in recording:
         problem, as_it_was = base.problem, base.problem.plain
@@ -306,11 +333,34 @@ def _change(one: Concealment, recording: Sequence[Baseline], truth: Truth) -> _C
         white = problem.whitening_filter.white(by_step)
         gain += _gain_of_noise(white.reshape(by_step.shape)) if unsteady else 0.0
         changed.append(white)
+        if not unsteady:
+            formulas.append(_formulas(base, altered, truth))
         windows = problem.windows
         by_window = windows.gap(altered) - windows.gap(as_it_was)
         usual = np.sqrt(np.mean(windows.measured[:, windows.channels] ** 2, axis=0))
         moved = max(moved, float((np.sqrt(np.mean(by_window**2, axis=0)) / np.maximum(usual, 1e-12)).max()))
-    return _Change(np.concatenate(changed), gain, moved, unsteady)
+    together = tuple(np.concatenate(every) for every in zip(*formulas, strict=True))
+    return _Change(np.concatenate(changed), gain, moved, unsteady, together)
+
+
+def _formulas(base: Baseline, altered: ForceModel, truth: Truth) -> list[Floats]:
+    """Return what the library's own effect does to the whitened prediction errors of a log, shape (w,) each.
+
+    One that is far from linear, such as a delay of what changes fast, does to the altered record what undoes it, and another
+    thing to the record as it was. A mass would take its share of the noise in the altered one along.
+    """
+    effect = effects().get(truth.effect)
+    if effect is None:
+        return []
+    problem, profile = base.problem, base.log.profile
+    candidate = replace(
+        Candidate.of(effect, truth.instance, profile),
+        onset_s=truth.onset_s or 0.0,
+        offset_s=inf if truth.offset_s is None else truth.offset_s,
+    )
+    p = np.array([truth.values.get(one.name, one.neutral) for one in candidate.parameters])
+    records = [problem.plain] if effect.changes_hull else [problem.plain, altered]
+    return [problem.white(candidate.act(one, p)) - problem.white(one) for one in records]
 
 
 def _parts(one: Concealment, log: RecordedLog, truth: Truth) -> Floats:
@@ -334,11 +384,30 @@ def resampled(parts: Floats, t: Floats, at: Floats) -> Floats:
     return np.column_stack([np.interp(at, t, one) for one in flat.T]).reshape(len(at), *parts.shape[1:])
 
 
+def _seen(change: _Change, before: Sequence[Baseline], slopes: Floats) -> float:
+    """Return the length of an effect's deviation, less what others take up, as far as the library's formula has it."""
+    white = _and_none(change.white, before)
+    if not change.formulas:
+        return _beside(white, slopes)
+    return max(_along(white, _and_none(one, before), slopes) for one in change.formulas)
+
+
 def _beside(changed: Floats, slopes: Floats) -> float:
     """Return the length of whitened changes, shape (w,), less what others take up within their prior; slopes shape (w, n)."""
-    across = slopes.T @ changed
-    taken = across @ np.linalg.solve(slopes.T @ slopes + np.eye(slopes.shape[1]), across)
-    return sqrt(max(float(changed @ changed - taken), 0.0))
+    return sqrt(max(float(changed @ _left(changed, slopes)), 0.0))
+
+
+def _along(changed: Floats, formula: Floats, slopes: Floats) -> float:
+    """Return the length of whitened changes along what a formula does, shape (w,) each, less what others take up of both."""
+    left = _left(formula, slopes)
+    return abs(float(changed @ left)) / sqrt(max(float(formula @ left), 1e-300))
+
+
+def _left(changed: Floats, slopes: Floats) -> Floats:
+    """Return what others leave of whitened changes, shape (w,), within their prior of one; slopes shape (w, n)."""
+    return np.asarray(
+        changed - slopes @ np.linalg.solve(slopes.T @ slopes + np.eye(slopes.shape[1]), slopes.T @ changed)
+    )
 
 
 def _gain_of_noise(white: Floats) -> float:

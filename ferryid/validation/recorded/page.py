@@ -175,9 +175,8 @@ def _not_made(scores: RecordedScores) -> list[str]:
         if one.effect:
             reason = one.why.partition(f" cannot be concealed in {one.recording}: ")[2] or one.why
         if one.size:
-            reason = (
-                f"more than 2 % of the rows cannot express it, {one.why.rpartition(' rows cannot express it, ')[2]}"
-            )
+            _, inexpressible, why = one.why.rpartition(" rows cannot express it, ")
+            reason = f"more than 2 % of the rows cannot express it, {why}" if inexpressible else why.partition(": ")[2]
         lines.setdefault(one.recording, {}).setdefault(reason.removesuffix("."), []).append(one)
     return [
         f"{recording}: {'; '.join(_lacking(reason, some) for reason, some in by_reason.items())}."

@@ -16,7 +16,7 @@ from ferryid.validation.name_scores import HULL, Share, names, outcome_of_missed
 from ferryid.validation.recorded.case_sampling import NotMade
 from ferryid.validation.recorded.doses import Doses, joined
 from ferryid.validation.recorded.effects import Concealment, concealments
-from ferryid.validation.recorded.own_errors import OwnErrors
+from ferryid.validation.recorded.own_errors import OwnErrors, OwnForces
 from ferryid.validation.records import UNKNOWN, CaseResult, Key
 from ferryid.validation.rival_scores import Compare, RivalScores, rival_scores
 from ferryid.validation.targets import COVERED, FALSE, IN_TIME, Target, share_target
@@ -293,7 +293,10 @@ class RecordedScores(Record):
 
 
 def score_recorded(
-    results: Sequence[CaseResult], not_made: Sequence[NotMade], own: OwnErrors | None = None
+    results: Sequence[CaseResult],
+    not_made: Sequence[NotMade],
+    own: OwnErrors | None = None,
+    forces: OwnForces | None = None,
 ) -> RecordedScores:
     """Return the figures of merit of finished cases, each beside its recording as it was.
 
@@ -305,6 +308,8 @@ def score_recorded(
         What could not be concealed.
     own
         What the recordings have of the same errors by themselves; nothing where None.
+    forces
+        What they have by themselves of effects that forces show; nothing where None.
     """
     plain = {one.case.path: one for one in results if one.case.kind == "clean"}
     altered = [one for one in results if one.case.truths]
@@ -332,7 +337,11 @@ def score_recorded(
         tuple(_paired(one, plain[one.case.path]) for one in fresh if one.case.kind == "pair"),
         tuple(_gross(one) for one in broken),
         rival_scores([one for one in results if one.case.kind != GROSS], _beside_plain, concealments()),
-        tuple(_missed(one, plain[one.case.path]) for one in fresh if one.case.level is not None and _is_missed(one)),
+        tuple(
+            _missed(one, plain[one.case.path], forces or {})
+            for one in fresh
+            if one.case.level is not None and is_missed(one)
+        ),
         _responses(altered, plain, "changed"),
     )
 
@@ -503,13 +512,14 @@ def _response(effect: str, recording: str, results: Sequence[CaseResult], plain:
     )
 
 
-def _is_missed(result: CaseResult) -> bool:
+def is_missed(result: CaseResult) -> bool:
+    """Return whether an effect of twice the oracle's size or more was not named."""
     case = result.case
     large = 0.0 < TWICE_SEEN * case.oracle_size <= case.size
     return large and case.truths[0].key not in names(result)
 
 
-def _missed(result: CaseResult, plain: CaseResult) -> Missed:
+def _missed(result: CaseResult, plain: CaseResult, forces: OwnForces) -> Missed:
     case, key = result.case, result.truths[0].key
     before = {one.key for one in plain.diagnosis.findings}
     new = [one for one in result.diagnosis.findings if one.key not in before and one.key != key]
@@ -520,9 +530,25 @@ def _missed(result: CaseResult, plain: CaseResult) -> Missed:
         case.size / case.oracle_size,
         case.size / case.distinct_size if case.distinct_size else 0.0,
         outcome_of_missed(difference(result, plain), key),
-        why_missed(result, key),
+        "; ".join(filter(None, [_cancelled(case, forces), why_missed(result, key)]))
+        or ("smaller than the distinct size" if case.size < case.distinct_size else ""),
         tuple(dict.fromkeys(label(one.key) if not one.hint else f"{label(one.key)}, a hint" for one in new)),
     )
+
+
+def _cancelled(case: Case, forces: OwnForces) -> str:
+    """Return that the recording as it was has the opposite of an effect, so that too little is left; empty where it has not."""
+    truth = case.truths[0]
+    mine, known = forces.get((case.path, truth.key)), concealments()[truth.effect]
+    if mine is None or len(truth.values) != 1:
+        return ""
+    (concealed,) = truth.values.values()
+    left = _together(concealed, mine, known) - known.neutral
+    size = case.size * abs(left / (concealed - known.neutral))
+    if size >= min(case.size, TWICE_SEEN * case.oracle_size):
+        return ""
+    times = f"{size / case.oracle_size:.1f} times the oracle's size"
+    return f"the recording as it was has {mine:.3g} of it by its best estimate, which leaves {times}"
 
 
 def _gross(difference_: CaseResult) -> Gross:

@@ -11,7 +11,7 @@ import pytest
 
 from ferryid.diagnose.inference.estimation import Candidate, Fit
 from ferryid.diagnose.judging import campaign_properties
-from ferryid.diagnose.judging.campaign_properties import _one_shape_of_each_curve
+from ferryid.diagnose.judging.campaign_properties import _one_of_two_that_hide, _one_shape_of_each_curve
 from ferryid.diagnose.judging.rivals import RivalComparison, RivalFit, redundant_shape, same_curve
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
@@ -102,23 +102,62 @@ def test_of_two_shapes_of_a_curve_that_explain_the_same_the_weaker_is_redundant(
         assert found[2] == pytest.approx(1112.5 / 1136.2)
 
 
-def test_a_campaign_keeps_one_shape_of_a_curve_with_the_other_as_its_rival(monkeypatch: pytest.MonkeyPatch) -> None:
-    evidence = {(AIR, LIMIT): 208.3, (AIR,): 136.2, (LIMIT,): 112.5, (): -1000.0}
+@pytest.fixture
+def estimate(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
+    """Return an estimate of some properties, by the evidence over none of each set of them."""
 
-    def estimate(*properties: Candidate) -> Any:
+    def made(evidence: dict[tuple[str, ...], float], *properties: Candidate) -> Any:
         return SimpleNamespace(
             campaign=SimpleNamespace(properties=properties),
-            evidence=evidence[tuple(one.effect.id for one in properties)],
+            evidence=-1000.0 + evidence[tuple(one.effect.id for one in properties)],
+            all=evidence,
         )
 
     monkeypatch.setattr(
         campaign_properties,
         "without_property",
-        lambda made, one: estimate(*(other for other in made.campaign.properties if other is not one)),
+        lambda one, gone: made(one.all, *(other for other in one.campaign.properties if other is not gone)),
     )
-    made, rivals = _one_shape_of_each_curve(estimate(*SHAPES), {})
+    return made
+
+
+def test_a_campaign_keeps_one_shape_of_a_curve_with_the_other_as_its_rival(estimate: Callable[..., Any]) -> None:
+    evidence = {(AIR, LIMIT): 1208.3, (AIR,): 1136.2, (LIMIT,): 1112.5, (): 0.0}
+    made, rivals = _one_shape_of_each_curve(estimate(evidence, *SHAPES), {})
     assert [one.effect.id for one in made.campaign.properties] == [AIR]
     (rival,) = rivals[SHAPES[0].key]
     assert rival.candidate.effect.id == LIMIT
-    assert rival.odds == pytest.approx(112.5 - 136.2)
+    assert rival.odds == pytest.approx(1112.5 - 1136.2)
     assert rival.share >= JUDGING.alike_shapes
+
+
+DELAY, LAG = "time_delay", "thruster_lag"
+
+
+@pytest.mark.parametrize(
+    ("alone", "unknown", "kept"),
+    [
+        # Together either may be all of it, or none: the likelier one is left, with its own interval.
+        ({DELAY: 90.0, LAG: 80.0}, {DELAY, LAG}, [DELAY]),
+        ({DELAY: 70.0, LAG: 95.0}, {DELAY, LAG}, [LAG]),
+        # Of one the interval shows that it is there.
+        ({DELAY: 90.0, LAG: 80.0}, {LAG}, [DELAY, LAG]),
+        # Neither explains what both do.
+        ({DELAY: 60.0, LAG: 60.0}, {DELAY, LAG}, [DELAY, LAG]),
+    ],
+)
+def test_of_a_delay_and_a_lag_that_hide_each_other_a_campaign_keeps_one(
+    alone: dict[str, float],
+    unknown: set[str],
+    kept: list[str],
+    estimate: Callable[..., Any],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(campaign_properties, "_holds_none", lambda made, one: one.effect.id in unknown)
+    both = [candidate(DELAY, None), candidate(LAG, None)]
+    evidence: dict[tuple[str, ...], float] = {(DELAY, LAG): 100.0, (): 0.0}
+    evidence |= {(name,): gain for name, gain in alone.items()}
+    made, rivals = _one_of_two_that_hide(estimate(evidence, *both), {})
+    assert [one.effect.id for one in made.campaign.properties] == kept
+    gone = [one for one in both if one.effect.id not in kept]
+    assert [one.candidate for every in rivals.values() for one in every] == gone

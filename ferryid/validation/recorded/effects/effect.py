@@ -12,6 +12,7 @@ from ferryid.types import Flags, Floats
 from ferryid.validation.case import Truth
 from ferryid.validation.plant.effects.effect import Span
 from ferryid.validation.recorded.log import RecordedLog
+from ferryid.vessel.dimensions import dimensions
 
 SENSOR, ACTUATOR, LOAD = "sensor", "actuator", "load"
 """Families: what the navigation reports, what an actuator gives, and what acts on the hull besides."""
@@ -105,6 +106,5 @@ def acting(truth: Truth, t: Floats) -> Flags:
 
 
 def length_of(log: RecordedLog) -> float:
-    """Return the vessel's length [m]; by its mass where it is not stated."""
-    length = log.profile.hull.length_m
-    return float(length) if np.isfinite(length) else 2.0 * float(log.profile.hull.mass_kg) ** (1.0 / 3.0)
+    """Return the vessel's length [m], that by which a diagnosis judges what is on the hull."""
+    return dimensions(log.profile)[0]
