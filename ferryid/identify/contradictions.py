@@ -134,7 +134,7 @@ def wrong_size(
     if orders and not small:
         remedy += (
             ", or map the actuators' feedback in place of their orders, if the log has it, or state how late these are "
-            "followed (time_constant_s, delay_s in their tables)"
+            'followed (time_constant_s, delay_s in the [signals."NAME.speed.command"] and the like)'
         )
     return f"{told}{cause}. Fix: in {profile}, {remedy}"
 
