@@ -11,6 +11,7 @@ import numpy as np
 
 from ferryid.counts import counted
 from ferryid.diagnose import Diagnosis, Finding, Withheld, campaign_verdict
+from ferryid.effects.wording import MEANS_LITTLE
 from ferryid.log_warnings import log_warnings
 from ferryid.models.prediction import FreeRun
 from ferryid.report import (
@@ -114,14 +115,14 @@ def _several_as_text(diagnoses: Sequence[Diagnosis]) -> str:
     shared = diagnosis_words.notes_of_all(diagnoses)
     common = diagnosis_words.findings_of_all(diagnoses)
     together = second_sources.of_all(diagnoses)
-    artificial = [note for note in shared if NO_RECORDING in note]
-    blocks += [_folded(f"note: {note}") for note in artificial]
+    first = [note for note in shared if NO_RECORDING in note or MEANS_LITTLE in note]
+    blocks += [_folded(f"note: {note}") for note in first]
     if common:
         lines = [f"{diagnosis_words.where_common(diagnoses, common)}:", *_listed(common)]
         blocks.append("\n".join(_folded(line) for line in lines))
     blocks += campaign.text_tables(diagnoses)
     about_all = [
-        *(note for note in shared if note not in artificial),
+        *(note for note in shared if note not in first),
         *likeness.notes(diagnoses[0].likeness_of_all, "these logs together"),
     ]
     if about_all:
