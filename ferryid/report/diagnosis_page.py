@@ -51,8 +51,10 @@ def render(
     """
     several = len(diagnoses) > 1
     shared = diagnosis_words.notes_of_all(diagnoses)
-    gathered = [note for note in shared if note in diagnoses[0].gathered]
-    foremost = [] if several else diagnosis_words.foremost_notes(diagnoses[0])
+    foremost = (
+        [note for note in shared if MEANS_LITTLE in note] if several else diagnosis_words.foremost_notes(diagnoses[0])
+    )
+    gathered = [note for note in shared if note in diagnoses[0].gathered and note not in foremost]
     common = diagnosis_words.findings_of_all(diagnoses)
     together = second_sources.of_all(diagnoses)
     logs = [
@@ -80,7 +82,7 @@ def render(
         made=made,
         gathered=gathered,
         foremost=foremost,
-        shared_notes=[note for note in shared if note not in gathered],
+        shared_notes=[note for note in shared if note not in (*gathered, *foremost)],
         shared_sources=second_sources.section(together) if together else {},
         shared_model=diagnosis_words.model_of_all(diagnoses),
         axes=list(zip(AXES, UNITS, strict=True)),

@@ -282,6 +282,13 @@ class JudgingThresholds:
         "held-out error that a finding must remove on some axis while it acts",
         "tuned on cases of `ferryid prove`: clean logs named small inflow losses and currents",
     )
+    least_hinted: float = threshold(
+        0.01,
+        "of the squared force error",
+        "held-out error that what makes another axis worse, or surely predicts no log better, must remove on some axis to be a "
+        "hint",
+        "convention: one per cent, the last digit of what is reported of it",
+    )
     idle_share: float = threshold(
         0.1,
         "of the recorded force",
