@@ -17,10 +17,10 @@ from ferryid.diagnose.inference.sessions import in_time, start_ns
 from ferryid.diagnose.inference.stages import AveragedLog, average
 from ferryid.diagnose.judging.campaign_split import Split, find_split
 from ferryid.diagnose.judging.diagnosis import distinct
-from ferryid.effects.wording import listed
+from ferryid.effects.wording import MEANS_LITTLE, listed
 from ferryid.errors import FerryIdError
 from ferryid.files import name_of_log, resolved
-from ferryid.identify.engagement import unanswered_force, unengaged
+from ferryid.identify.engagement import pooled, unanswered_force, unengaged
 from ferryid.models import Model
 from ferryid.side_by_side import over
 from ferryid.signals.artificial import NO_RECORDING
@@ -144,18 +144,24 @@ def unused(paths: Sequence[str], groups: Sequence[Group]) -> tuple[tuple[str, st
 
 
 def _unanswered(logs: Sequence[AveragedLog], profile: Profile) -> tuple[str, ...]:
-    """Return a sentence on logs that are used though the vessel hardly follows the applied force in them."""
-    told = {one.path: unanswered_force(one.screened.measured.response, profile) for one in logs}
+    """Return a sentence on logs that are used though the vessel hardly follows the applied force in them.
+
+    Each of several may be too short to show it, where together they do: they have one profile.
+    """
+    responses = [one.screened.measured.response for one in logs]
+    told = {one.path: unanswered_force(response, profile) for one, response in zip(logs, responses, strict=True)}
     several = [(path, why) for path, why in told.items() if why]
-    if not several:
+    together = ""
+    if len(logs) > 1 and not any(one.answered for one in responses if one is not None):
+        together = unanswered_force(pooled(responses), profile)
+    if not several and not together:
         return ()
-    (path, why), more = several[0], len(several) - 1
-    what, _, remedy = why.partition(". Fix: ")
-    also = f" So it is in {counted(more, 'more log')}." if more else ""
-    return (
-        f"{name_of_log(path)}: {what}. What is found of forces in such a log means little.{also} Fix: see whether the "
-        f"actuators were engaged, or {remedy}",
-    )
+    path, why = several[0] if several else ("", together)
+    what, _, remedy = (together or why).partition(". Fix: ")
+    more = len(several) - 1
+    also = f" So it is in {counted(more, 'more log')}." if more > 0 and not together else ""
+    whose = f"In these {len(logs)} logs together" if together else f"{name_of_log(path)}:"
+    return (f"{whose} {what}. {MEANS_LITTLE}{also} Fix: see whether the actuators were engaged, or {remedy}",)
 
 
 def engaged(groups: Sequence[tuple[str, Gathered]], profile: Profile) -> tuple[Gathered, ...]:

@@ -83,7 +83,20 @@ _NO_MEASUREMENT = frozenset(
 PLACE = frozenset({"position", "pos", "translation", "point", "location", "pose", "odom", "odometry", "place"})
 SPEEDS = frozenset({"linear", "velocity", "velo", "vel", "twist", "speed", "velocities"})
 RATES = frozenset(
-    {"angular", "gyro", "gyr", "gyroscope", "omega", "rates", "angvelo", "rate", "angvel", "yawrate", "zgyro"}
+    [
+        "angular",
+        "gyro",
+        "gyr",
+        "gyroscope",
+        "omega",
+        "rates",
+        "angvelo",
+        "rate",
+        "angvel",
+        "yawrate",
+        "zgyro",
+        "rotational",
+    ]
 )
 HEADING = frozenset({"heading", "hdg", "yaw", "psi", "compass", "hdt"})
 _AHEAD = SPEEDS | {"u", "surge", "spd", "sog", "stw"}
@@ -92,6 +105,13 @@ _OF_A_SPEED = frozenset({"water", "field"})
 _ASIDE = frozenset({"y", "z"})
 _OTHER_SPEEDS = frozenset({"wind", "air", "vertical", "down", "heave", "sway", "turn"})
 _QUATERNION = frozenset({"orientation", "rotation", "quaternion", "heading", "attitude"})
+_ANGLES = frozenset({"orientation", "attitude", "euler", "rpy"})
+"""What three numbers are roll, pitch and heading of."""
+_PRESENT = frozenset({*_ANGLES, "rotational", "angular", "yaw", "psi", "pose", "position", "lat", "lon"})
+"""What a current of the water or of a battery has none of: before these words it says that the value is the present one."""
+_WORLD_AXES = (("n", "e"), ("north", "east"))
+_OF_THREE = (("1", "2", "3"), ("0", "1", "2"))
+"""Numbers of the three parts of a vector."""
 ACTUATORS = frozenset(
     [
         "thruster",
@@ -173,7 +193,7 @@ class FieldGroup:
     def named_frame(self) -> str:
         """The frame of a world that the names of a velocity's components state, or an empty string."""
         last = tuple(words_of(path)[-1] for path in self.fields)
-        return "NED" if last in (("vn", "ve"), ("vnorth", "veast")) else ""
+        return "NED" if last in (("vn", "ve"), ("vnorth", "veast"), *_WORLD_AXES) else ""
 
     @property
     def label(self) -> str:
@@ -225,11 +245,16 @@ def navigation_groups(topics: Sequence[Topic]) -> list[FieldGroup]:
             continue
         fields = {
             path: words
-            for path, words in numeric_fields(topic).items()
+            for path, words in ((path, _present(words)) for path, words in numeric_fields(topic).items())
             if not set(words) & (ORDERS | _NO_MEASUREMENT | ACTUATORS | {"wind", "wrench", "force", "torque"})
         }
         found += _of_topic(topic, around, fields)
     return found
+
+
+def _present(words: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the words of a name without one that says no more than that the value is the present one."""
+    return words[1:] if words[:1] == ("current",) and set(words[1:]) & _PRESENT else words
 
 
 def _of_topic(topic: Topic, around: set[str], fields: Mapping[str, tuple[str, ...]]) -> list[FieldGroup]:
@@ -248,11 +273,22 @@ def _of_topic(topic: Topic, around: set[str], fields: Mapping[str, tuple[str, ..
         if {"x", "y", "z", "w"} <= axes.keys() and what & _QUATERNION:
             found.append(("heading", tuple(axes[one] for one in "xyzw"), "quaternion"))
             continue
+        third = next((axes[three[2]] for three in _OF_THREE if axes.keys() == set(three)), None)
+        if third is not None and set(stem) & (RATES | _ANGLES):
+            found.append(("yaw_rate" if set(stem) & RATES else "heading", (third,), ""))
         found += _vectors(topic, what, set(stem), axes)
+    slow = {
+        axis: path
+        for _, axes in longest_first
+        for axis, path in reversed(axes.items())
+        if not set(fields[path]) & SPEEDS
+    }
     for kind, pairs in _PAIRS.items():
         for first, second in pairs:
-            if {first, second} <= every.keys():
-                found.append((kind, (every[first], every[second]), ""))
+            # North and east of a velocity are no position.
+            axes_of = slow if kind == "position" else every
+            if {first, second} <= axes_of.keys():
+                found.append((kind, (axes_of[first], axes_of[second]), ""))
     for names in (("latitude", "longitude"), ("lat", "lon"), ("lat", "lng"), ("lat", "long")):
         if set(names) <= every.keys():
             found.append(("position", (every[names[0]], every[names[1]]), "geodetic"))
@@ -281,6 +317,9 @@ def _vectors(
     topic: Topic, what: set[str], stem: set[str], axes: Mapping[str, str]
 ) -> Iterable[tuple[str, tuple[str, ...], str]]:
     """Yield what the axes x, y, z under one stem may be."""
+    for north, east in _WORLD_AXES:
+        if {north, east} <= axes.keys() and stem & SPEEDS and not stem & RATES:
+            yield "velocity", (axes[north], axes[east]), ""
     if not {"x", "y"} <= axes.keys():
         if "z" in axes and what & RATES:
             yield "yaw_rate", (axes["z"],), ""

@@ -28,8 +28,10 @@ _THRUSTERS = {
 """Words of what pushes, with the name of it; a servo that has a number is an output of an autopilot."""
 _BOTH_SIDES = (frozenset({"port", "starboard"}), frozenset({"left", "right"}))
 _VALUES = frozenset({"data", "value", "raw", "out", "output"})
-_NUMBERED = re.compile(r"([Tu])([0-9]+)")
-"""Columns of forces or orders as textbooks number them; a lower t is a time."""
+_UNITS_OF_SHARES = frozenset({"us", "pwm", "pct", "percent", "cmd"})
+_NUMBERED = re.compile(r"([Tun])([0-9]+)")
+"""Columns of forces, orders or propeller speeds as textbooks number them; a lower t is a time."""
+_AS_SPEED = "its name does not state of what it is: the speed of a propeller is assumed"
 _OUTPUT = re.compile(r"RCOU[._ ](?:C|Ch)([0-9]+)")
 """Columns of a table made of a log of ArduPilot."""
 
@@ -47,7 +49,7 @@ def guessed_orders(topics: Sequence[Topic], named: Sequence[ActuatorField]) -> l
     """Return fields that may be orders to thrusters, but for those that are named as what they are.
 
     Sides with an order and nothing else, and columns as ``T1`` and ``u1``, are taken only where no thruster has a better name:
-    both sides, or several of one letter.
+    both sides, several of one letter, or the one throttle.
     """
     known, paired = {one.label for one in named}, paired_names(topics)
     found = [
@@ -63,7 +65,7 @@ def guessed_orders(topics: Sequence[Topic], named: Sequence[ActuatorField]) -> l
         return sure
     every = frozenset().union(*(one.said for one in found))
     sides = [one.field for one in found if any(one.said & both and both <= every for both in _BOTH_SIDES)]
-    return sides or _numbered(topics)
+    return sides or _numbered(topics) or _throttle(topics)
 
 
 def _guess(topic: Topic, path: str, own: tuple[str, ...], paired: frozenset[tuple[str, ...]]) -> _Guess | None:
@@ -111,5 +113,20 @@ def _numbered(topics: Sequence[Topic]) -> list[ActuatorField]:
     letters = [match[1] for _, _, match in columns]
     several = next((letter for letter in letters if letters.count(letter) > 1), "")
     return [
-        _field(topic, path, f"actuator{match[2]}", WHETHER) for topic, path, match in columns if match[1] == several
+        ActuatorField(f"actuator{match[2]}", "speed", None, topic.name, path, rate_of(topic), assumed=_AS_SPEED)
+        if several == "n"
+        else _field(topic, path, f"actuator{match[2]}", WHETHER)
+        for topic, path, match in columns
+        if match[1] == several
     ]
+
+
+def _throttle(topics: Sequence[Topic]) -> list[ActuatorField]:
+    """Return the column of a throttle if it is the only one: it drives the one propeller, ahead of a rudder if there is one."""
+    found = [
+        _field(topic, path, "propeller", OF_WHAT)
+        for topic in topics if topic.name == "table"
+        for path, words in numeric_fields(topic).items()
+        if words[:1] == ("throttle",) and set(words[1:]) <= _VALUES | _UNITS_OF_SHARES
+    ]  # fmt: skip
+    return found if len(found) == 1 else []

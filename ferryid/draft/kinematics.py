@@ -95,9 +95,11 @@ def navigation_signals(groups: Sequence[FieldGroup], samples: Samples) -> tuple[
             first, second = (_smoothed(samples, velocity, place) * scale for place in (0, 1))
             motion_u, motion_v = first, second if chosen.frame == "FRD" else -second
     rate = _yaw_rate(groups, samples, slope, pose.heading)
-    if rate is None and (unlike := [one.label for one in groups if one.kind == "yaw_rate"]):
+    if rate is None and (unlike := [one for one in groups if one.kind == "yaw_rate"]):
         place = next(k for k, one in enumerate(found) if one.quantity == "heading")
-        told = f"no yaw rate of the log follows it ({', '.join(unlike)}): none is mapped, and its slope stands for one"
+        names = ", ".join(one.label for one in unlike)
+        told = f"no yaw rate of the log follows it ({names}): none is mapped, and its slope stands for one"
+        told += _turned_with_course(unlike, pose, slope, samples)
         found[place] = replace(found[place], doubts=(*found[place].doubts, told))
     if rate is not None:
         found.append(rate)
@@ -286,6 +288,32 @@ def _course(pose: _Pose) -> _Course:
         return _Course()
     course = np.arctan2(pose.east[rows], pose.north[rows])
     return _Course(complex(np.mean(np.exp(1j * (course - pose.psi[rows])))))
+
+
+def _turned_with_course(rates: Sequence[FieldGroup], pose: _Pose, slope: Floats, samples: Samples) -> str:
+    """Return which yaw rate turns as the course does where the heading does not: the heading is wrong then, not the rate.
+
+    On a vessel that makes way, course and heading differ by the drift angle alone.
+    """
+    speed = np.hypot(pose.north, pose.east)
+    known = np.isfinite(speed)
+    if not known.any():
+        return ""
+    moving = known & usual(speed, known)
+    moving &= speed > DRAFT.moving * float(np.quantile(speed[moving], 0.95))
+    # The angle between neighbouring velocities: no course needs to be unwrapped over rows without way.
+    cross = pose.north[:-1] * pose.east[1:] - pose.east[:-1] * pose.north[1:]
+    along = pose.north[:-1] * pose.north[1:] + pose.east[:-1] * pose.east[1:]
+    turns = np.full(speed.shape, np.nan)
+    turns[1:] = np.where(moving[1:] & moving[:-1], np.arctan2(cross, along), np.nan) / np.diff(samples.grid_s)
+    seen = {one.label: abs(correlation(_smoothed(samples, one, 0), turns)) for one in rates}
+    best, mine = max(seen, key=lambda label: seen[label]), correlation(slope, turns)
+    if seen[best] < DRAFT.seen_rate or mine >= DRAFT.seen_rate:
+        return ""
+    return (
+        f". The course over ground turns as {best} says (correlation {seen[best]:.2f}), and not as the heading "
+        f"({mine:.2f}): the heading is wrong, as of a compass beside iron or currents, and what is fitted to it would be, too"
+    )
 
 
 def _position(pose: _Pose, chosen: _Agreement, named: str) -> MappedSignal:

@@ -56,6 +56,10 @@ IS_A_HINT = " is a hint: "
 """What stands in a note between a finding and the reason that makes a hint of it."""
 
 
+MEANS_LITTLE = "What is found of forces in such logs means little."
+"""What stands in a note on logs in which the vessel hardly follows the applied force."""
+
+
 def uncapitalised(text: str) -> str:
     """Return a title or sentence as it goes on within another."""
     return text[:1].lower() + text[1:]

@@ -62,23 +62,36 @@ def wrong_way(
     elif 1 in wrong:
         cause = "the actuators and the motion have y axes that point to opposite sides"
         remedy = 'set frame = "FLU" for velocity and yaw rate, or change the sign of y in position_m of the actuators'
+        if angles and 2 in wrong:
+            # What an angle pushes aside turns the vessel, too.
+            cause = f"an angle has the wrong sign, or {cause}"
+            remedy = f"turn the sign in {_tables(angles)}, or {remedy}"
     else:
         causes = ["actuators are exchanged (port and starboard, bow and stern)"] if actuators > 1 else []
         causes += ["an angle has the wrong sign"] if angles else []
         lines = ", ".join(f'[signals."{one}"] with [signals."{other}"]' for one, other in pairs)
         exchange = f"exchange the signals of the actuators{f' ({lines})' if lines else ''}"
         remedies = [exchange] if actuators > 1 else []
-        tables = " or ".join(f'[signals."{one}"]' for one in angles)
-        remedies += [f"turn the sign in {tables}"] if angles else []
+        remedies += [f"turn the sign in {_tables(angles)}"] if angles else []
         cause = ", or ".join([*causes, "heading and yaw rate count anticlockwise"])
         remedy = ", or ".join([*remedies, "set the frames of heading and yaw rate"])
     return f"{told}: {cause}. Fix: in {profile}, {remedy}"
 
 
+def _tables(signals: Sequence[str]) -> str:
+    return " or ".join(f'[signals."{one}"]' for one in signals)
+
+
 def signs_of(profile: Profile) -> tuple[list[str], int, list[tuple[str, str]]]:
     """Return signals that say where actuators push, the number of actuators, and signals of two that may be exchanged."""
     quantities = [one.quantity for one in profile.signals]
-    angles = [one for one in quantities if one.endswith((".rudder", ".angle"))]
+    # An order counts where the angle was not measured.
+    angles = [
+        one
+        for one in quantities
+        if one.removesuffix(".command").endswith((".rudder", ".angle"))
+        and (one.removesuffix(".command") == one or one.removesuffix(".command") not in quantities)
+    ]
     pairs = list[tuple[str, str]]()
     if len(profile.actuators) == 2:
         first, second = (one.name for one in profile.actuators)
@@ -134,7 +147,7 @@ def wrong_size(
     if orders and not small:
         remedy += (
             ", or map the actuators' feedback in place of their orders, if the log has it, or state how late these are "
-            "followed (time_constant_s, delay_s in their tables)"
+            'followed (time_constant_s, delay_s in the [signals."NAME.speed.command"] and the like)'
         )
     return f"{told}{cause}. Fix: in {profile}, {remedy}"
 

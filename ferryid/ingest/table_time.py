@@ -17,8 +17,9 @@ _READABLE = 0.75
 """Share of the cells that must be readable in a column that is guessed to be the time."""
 _PREFIX = {3: "milli", 6: "micro", 9: "nano"}
 UNIT_NS = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1_000, "ns": 1}
-_DATETIME = re.compile(r"\s*\d{4}[-/.]\d{2}[-/.]\d{2}[ T]\d{2}:\d{2}:\d{2}([.,]\d*)?\s*(Z|[+-]\d{2}:?\d{2})?\s*$")
-_CLOCK = re.compile(r"\s*\d{1,2}:\d{2}:\d{2}([.,]\d*)?\s*$")
+_DATETIME = re.compile(r"\s*\d{4}[-/.]\d{2}[-/.]\d{2}[ T_]\d{2}:\d{2}:\d{2}([.,:]\d*)?\s*(Z|[+-]\d{2}:?\d{2})?\s*$")
+"""Scripts that name files after the time also write it as ``2024-03-07_15:34:58:780059``."""
+_CLOCK = re.compile(r"\s*\d{1,2}:\d{2}:\d{2}([.,:]\d*)?\s*$")
 _CLOCK_ROWS = 1000
 _HALF_DAY_NS = 43_200 * 1_000_000_000
 _TIME_NAME = re.compile(
@@ -82,7 +83,7 @@ class TimePlan:
 
 
 def looks_like_datetime(text: str) -> bool:
-    """Return True for ``2025/04/11 11:15:45.313`` and its ISO 8601 kin, year first."""
+    """Return True for ``2025/04/11 11:15:45.313`` and its kin, year first."""
     return _DATETIME.match(text) is not None
 
 
@@ -95,8 +96,8 @@ def guess_time(sample: Mapping[str, Sequence[str]]) -> TimePlan | None:
     """Guess the time column from names and a sample of the rows, None where nothing looks like one.
 
     A name that is no more than a word for time comes first, then a column of dates, then a rising column with such a word
-    somewhere in its name, and last a rising first column without a name. Other columns of the third kind are listed in
-    the note.
+    somewhere in its name, before dates without a zone where it counts from 1970, and last a rising first column without a
+    name. Other columns of the third kind are listed in the note.
 
     Parameters
     ----------
@@ -106,14 +107,19 @@ def guess_time(sample: Mapping[str, Sequence[str]]) -> TimePlan | None:
     for name in sample:
         if _TIME_NAME.match(_without_unit(name)[0]) and (plan := _time_of(sample, name)) is not None:
             return _finer(sample, plan)
-    for name, values in sample.items():
-        if _are_datetimes(values):
-            return _plan(sample, name, "datetime", "date and time")
     found = {
         name: numbers
         for name, values in sample.items()
         if has_time_word(name) and (numbers := _rising(values, strict=False)) is not None and np.ptp(numbers) > 0.0
     }
+    # A date without a zone may be of any, seconds since 1970 are not.
+    since_1970 = any(
+        _counts_from_1970(name, numbers) and 2 * len(set(sample[name])) > len(sample[name])
+        for name, numbers in found.items()
+    )
+    for name, values in sample.items():
+        if _are_datetimes(values) and not (since_1970 and _unzoned(values)):
+            return _plan(sample, name, "datetime", "date and time")
     if found:
         name, others = next(iter(found)), list(found)[1:]
         plan = _plan(sample, name, *_unit_of(_without_unit(name)[1], found[name]))
@@ -306,7 +312,7 @@ def datetimes_to_ns(texts: Sequence[str]) -> tuple[Nanoseconds, NDArray[np.bool_
     wanted_digits = [0, 1, 2, 3, 5, 6, 8, 9, 11, 12, 14, 15, 17, 18]
     good = is_digit[:, wanted_digits].all(axis=1)
     good &= np.isin(code[:, 4], [ord(c) for c in "-/."]) & (code[:, 4] == code[:, 7])
-    good &= np.isin(code[:, 10], [ord(c) for c in " T"])
+    good &= np.isin(code[:, 10], [ord(c) for c in " T_"])
     good &= (code[:, 13] == ord(":")) & (code[:, 16] == ord(":"))
     month, day = number(5, 2), number(8, 2)
     hour, minute, second = number(11, 2), number(14, 2), number(17, 2)
@@ -322,7 +328,7 @@ def datetimes_to_ns(texts: Sequence[str]) -> tuple[Nanoseconds, NDArray[np.bool_
     # The fraction: digits after a point at place 19, as long as they last.
     fraction = np.zeros(rows, dtype=np.int64)
     length = np.zeros(rows, dtype=np.int64)
-    running = np.isin(code[:, 19], [ord("."), ord(",")]) if width > 19 else np.zeros(rows, dtype=bool)
+    running = np.isin(code[:, 19], [ord(c) for c in ".,:"]) if width > 19 else np.zeros(rows, dtype=bool)
     pointed = running.copy()
     for place in range(20, width):
         running &= is_digit[:, place]
@@ -409,6 +415,17 @@ def _are_datetimes(values: Sequence[str]) -> bool:
 def _are_clock_times(values: Sequence[str]) -> bool:
     readable = sum(looks_like_clock_time(value) for value in values)
     return readable > 0 and readable >= _READABLE * len(values)
+
+
+def _unzoned(values: Sequence[str]) -> bool:
+    """True where no date states its zone."""
+    return not any((found := _DATETIME.match(value)) is not None and found.group(2) for value in values)
+
+
+def _counts_from_1970(name: str, numbers: NDArray[np.float64]) -> bool:
+    """True for a time of which most numbers count from 1970 in its unit."""
+    scale = 1e9 / UNIT_NS[_unit_of(_without_unit(name)[1], numbers)[0]]
+    return _EARLIEST_S * scale < float(np.median(numbers)) < _LATEST_S * scale
 
 
 def _plan(sample: Mapping[str, Sequence[str]], column: str, unit: str, says: str) -> TimePlan:

@@ -219,11 +219,27 @@ def plan_time(where: str, names: Sequence[str], layout: TableLayout, *, typed: b
         return None
     for name in (layout.time, *layout.stamp):
         if name not in names:
+            if other := _separator_of(name, names):
+                raise FerryIdError(
+                    f'{where}: the profile\'s [table] wants the column "{name}" for the time, and its separator, '
+                    f'"{layout.separator}", finds all columns in one. Fix: add separator = "{other}" under [table]'
+                )
             raise FerryIdError(
                 f'{where}: the profile\'s [table] wants the column "{name}" for the time, found {_listed(names)}.'
                 f"{did_you_mean(name, names)} Fix: correct time, stamp, columns, separator or skip_rows under [table]"
             )
     return TimePlan(layout.time, layout.time_unit, layout.stamp)
+
+
+def _separator_of(name: str, names: Sequence[str]) -> str:
+    """Return the separator of a table that was read as one column, by a name of one of its columns; or an empty string."""
+    if len(names) != 1:
+        return ""
+    parts = {**{one: names[0].split(one) for one in (",", ";", "\t", "|")}, "whitespace": names[0].split()}
+    found = next(
+        (one for one, cells in parts.items() if len(cells) > 1 and name in (cell.strip() for cell in cells)), ""
+    )
+    return {"\t": r"\t"}.get(found, found)
 
 
 def with_stated_unit(plan: TimePlan, layout: TableLayout | None) -> TimePlan:

@@ -11,6 +11,7 @@ import numpy as np
 
 from ferryid.counts import counted
 from ferryid.diagnose import Diagnosis, Finding, Withheld, campaign_verdict
+from ferryid.effects.wording import MEANS_LITTLE
 from ferryid.log_warnings import log_warnings
 from ferryid.models.prediction import FreeRun
 from ferryid.report import (
@@ -50,8 +51,10 @@ def render(
     """
     several = len(diagnoses) > 1
     shared = diagnosis_words.notes_of_all(diagnoses)
-    gathered = [note for note in shared if note in diagnoses[0].gathered]
-    foremost = [] if several else diagnosis_words.foremost_notes(diagnoses[0])
+    foremost = (
+        [note for note in shared if MEANS_LITTLE in note] if several else diagnosis_words.foremost_notes(diagnoses[0])
+    )
+    gathered = [note for note in shared if note in diagnoses[0].gathered and note not in foremost]
     common = diagnosis_words.findings_of_all(diagnoses)
     together = second_sources.of_all(diagnoses)
     logs = [
@@ -79,7 +82,7 @@ def render(
         made=made,
         gathered=gathered,
         foremost=foremost,
-        shared_notes=[note for note in shared if note not in gathered],
+        shared_notes=[note for note in shared if note not in (*gathered, *foremost)],
         shared_sources=second_sources.section(together) if together else {},
         shared_model=diagnosis_words.model_of_all(diagnoses),
         axes=list(zip(AXES, UNITS, strict=True)),
@@ -114,14 +117,14 @@ def _several_as_text(diagnoses: Sequence[Diagnosis]) -> str:
     shared = diagnosis_words.notes_of_all(diagnoses)
     common = diagnosis_words.findings_of_all(diagnoses)
     together = second_sources.of_all(diagnoses)
-    artificial = [note for note in shared if NO_RECORDING in note]
-    blocks += [_folded(f"note: {note}") for note in artificial]
+    first = [note for note in shared if NO_RECORDING in note or MEANS_LITTLE in note]
+    blocks += [_folded(f"note: {note}") for note in first]
     if common:
         lines = [f"{diagnosis_words.where_common(diagnoses, common)}:", *_listed(common)]
         blocks.append("\n".join(_folded(line) for line in lines))
     blocks += campaign.text_tables(diagnoses)
     about_all = [
-        *(note for note in shared if note not in artificial),
+        *(note for note in shared if note not in first),
         *likeness.notes(diagnoses[0].likeness_of_all, "these logs together"),
     ]
     if about_all:

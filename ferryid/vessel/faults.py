@@ -207,11 +207,14 @@ class TableReader:
             return default
         return value
 
-    def close(self) -> None:
-        """Note every key that nothing asked for."""
+    def close(self, elsewhere: Mapping[str, str] | None = None) -> None:
+        """Note every key that nothing asked for; `elsewhere` are keys that belong in another table, with its title."""
         for key in self.data:
             if key not in self._known:
                 where = f"in {self.title}" if self.path else "at the top of the file"
+                if elsewhere and key in elsewhere:
+                    self.fault(f'"{key}" cannot be {where}. Fix: move it to {elsewhere[key]}', key)
+                    continue
                 hint = did_you_mean(key, self._known - set(self.data))
                 names = ", ".join(sorted(self._known))
                 self.fault(f'unknown key "{key}" {where}.{hint} Fix: use one of {names}', key)

@@ -81,7 +81,8 @@ def _actuator(reader: TableReader) -> Actuator:
             reader.fault(
                 'a "propeller_rudder" needs "diameter_m", for the slipstream on the rudder. Fix: add diameter_m = ...'
             )
-    reader.close()
+    order = f'the table of its order, such as [signals."{name or "NAME"}.speed.command"]'
+    reader.close(dict.fromkeys(("time_constant_s", "delay_s"), order))
     return Actuator(name, kind, (position[0], position[1]), curve, angle_rad, count, rudder, inflow)
 
 

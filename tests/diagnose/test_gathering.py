@@ -30,8 +30,9 @@ from ferryid.diagnose.gathering import (
 )
 from ferryid.diagnose.inference.stages import AveragedLog
 from ferryid.effects.force_model import COEFFICIENTS
+from ferryid.effects.wording import MEANS_LITTLE
 from ferryid.errors import FerryIdError
-from ferryid.identify.engagement import ForceResponse
+from ferryid.identify.engagement import ForceResponse, pooled
 from ferryid.simulate import parse_scenario, simulate, write_log
 from ferryid.types import IN_MEMORY
 from ferryid.vessel import load_profile
@@ -269,7 +270,7 @@ def test_the_logs_of_another_group_show_it_too(days: list[str], logs: tuple[Aver
     # What is to be diagnosed or compared stays, as there is nothing else.
     _, alone = engaged([(CAMPAIGN, Gathered(logs[:1])), (CAMPAIGN, references)], FERRY)
     assert paths(alone.logs) == [days[1]]
-    assert "What is found of forces in such a log means little. Fix:" in alone.notes[0]
+    assert f"{MEANS_LITTLE} Fix:" in alone.notes[0]
 
 
 def test_a_log_by_itself_comes_with_what_explains_that_its_force_has_no_answer(
@@ -279,9 +280,46 @@ def test_a_log_by_itself_comes_with_what_explains_that_its_force_has_no_answer(
     assert len(found.logs) == 3
     (note,) = found.notes
     assert note.startswith(f"{Path(days[0]).name}: the applied forces accelerate the vessel by surge 0.01")
-    assert "So it is in 1 more log. Fix: see whether the actuators were engaged, or in milliampere, correct" in note
+    assert (
+        f"{MEANS_LITTLE} So it is in 1 more log. Fix: see whether the actuators were engaged, or in milliampere, correct"
+        in note
+    )
     assert "Left out" not in note
     assert engaged([(CAMPAIGN, Gathered(logs[:1]))], FERRY) == (Gathered(logs[:1]),)
+
+
+def unsure(log: AveragedLog, value: float) -> AveragedLog:
+    """Return a log that is too short to show how its vessel follows the applied force."""
+    response = ForceResponse(np.full(3, value), np.full(3, 0.1), np.full(3, 4.0), np.ones(3, dtype=bool), np.ones(3))
+    return replace(log, screened=replace(log.screened, measured=replace(log.screened.measured, response=response)))
+
+
+def test_short_logs_show_together_that_the_vessel_does_not_follow_the_force(logs: tuple[AveragedLog, ...]) -> None:
+    some = [unsure(log, value) for value in (0.02, 0.04) for log in (*logs, *logs, *logs)]
+    (found,) = engaged([(CAMPAIGN, Gathered(tuple(some)))], FERRY)
+    assert len(found.logs) == len(some)
+    (note,) = found.notes
+    assert note.startswith(
+        f"In these {len(some)} logs together the applied forces accelerate the vessel by surge 0.03 ±"
+    )
+    assert f"{MEANS_LITTLE} Fix: see whether the actuators were engaged, or in milliampere, correct" in note
+    # A few of them do not, nor do logs in one of which the vessel follows.
+    for other in (some[:2], [*some, logs[0]]):
+        assert engaged([(CAMPAIGN, Gathered(tuple(other)))], FERRY)[0].notes == ()
+
+
+def test_logs_that_scatter_are_no_surer_together() -> None:
+    spread, sigmas = np.full(3, 0.01), np.full(3, 4.0)
+    alike, apart = (
+        pooled([ForceResponse(np.full(3, one), spread, sigmas, np.ones(3, dtype=bool), np.ones(3)) for one in values])
+        for values in ((0.1, 0.1, 0.1, 0.1), (-0.3, 0.5, -0.3, 0.5))
+    )
+    assert alike is not None
+    assert apart is not None
+    assert np.allclose(alike.response, 0.1)
+    assert np.allclose(alike.spread, 0.005)
+    assert np.allclose(apart.response, 0.1)
+    assert np.allclose(apart.spread, np.std([-0.3, 0.5, -0.3, 0.5], ddof=1) / 2.0)
 
 
 def test_an_unengaged_run_of_the_catamaran_is_left_out_of_its_campaign(shared_data: Callable[[str], Path]) -> None:

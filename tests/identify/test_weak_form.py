@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ from ferryid.errors import FerryIdError
 from ferryid.identify import estimators, inputs
 from ferryid.identify import feasible as feasible_module
 from ferryid.identify import physical_checks as physical_checks_module
-from ferryid.identify.contradictions import wrong_size, wrong_way
+from ferryid.identify.contradictions import signs_of, wrong_size, wrong_way
 from ferryid.identify.estimation import estimate_correction
 from ferryid.identify.feasible import Feasible, _nearest, feasible_gains
 from ferryid.identify.inertia import relative_inertia
@@ -444,6 +444,28 @@ def test_forces_that_act_the_wrong_way_are_refused_with_their_cause(
         match=rf"accelerates the vessel in .* times what the base model expects.*{cause}.* Fix: in the profile",
     ):
         data_of(turned).refuse_contradictions()
+
+
+def test_an_angle_of_the_wrong_sign_is_named_where_sway_and_yaw_are_reversed() -> None:
+    spread = np.array([0.02, 0.1, 0.04])
+    both, sway = np.array([0.9, -0.48, -0.8]), np.array([0.9, -0.48, 0.8])
+    said = wrong_way(both, spread, "the profile boat", ["propeller.rudder"], 1)
+    assert (
+        "an angle has the wrong sign, or the actuators and the motion have y axes that point to opposite sides" in said
+    )
+    assert 'Fix: in the profile boat, turn the sign in [signals."propeller.rudder"], or set frame = "FLU"' in said
+    for told in (wrong_way(both, spread, "the profile boat"), wrong_way(sway, spread, "boat", ["propeller.rudder"], 1)):
+        assert "turn the sign" not in told
+        assert "opposite sides" in told
+
+
+def test_an_ordered_angle_counts_where_none_was_measured() -> None:
+    def angles(*quantities: str) -> list[str]:
+        signals = tuple(SimpleNamespace(quantity=one) for one in quantities)
+        return signs_of(cast(Profile, SimpleNamespace(signals=signals, actuators=(SimpleNamespace(name="stern"),))))[0]
+
+    assert angles("stern.speed", "stern.rudder.command") == ["stern.rudder.command"]
+    assert angles("stern.angle.command", "stern.angle") == ["stern.angle"]
 
 
 def test_forces_that_are_hardly_followed_are_not_taken_for_reversed_ones() -> None:

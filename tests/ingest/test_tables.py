@@ -224,6 +224,8 @@ def test_any_csv_reads_as_pythons_csv_module_reads_it(
         ("1969-12-31 23:59:59.5", (1969, 12, 31, 23, 59, 59, 500000000)),
         ("2025-04-11 13:15:45.25+02:00", (2025, 4, 11, 11, 15, 45, 250000000)),
         ("2025-04-11T11:15:45,123", (2025, 4, 11, 11, 15, 45, 123000000)),
+        # As a script writes it with strftime("%Y-%m-%d_%H:%M:%S:%f").
+        ("2024-03-07_15:34:58:080059", (2024, 3, 7, 15, 34, 58, 80059000)),
     ],
 )
 def test_datetimes_against_the_standard_library(text: str, expected: tuple[int, ...]) -> None:
@@ -247,6 +249,23 @@ def test_datetimes_of_any_day_against_numpy(moments: list[datetime]) -> None:
 def test_what_is_no_date_is_unreadable(text: str) -> None:
     _, good, _ = datetimes_to_ns(["2025-04-11 11:15:45.5", text])
     assert good.tolist() == [True, False]
+
+
+def test_dates_without_a_zone_give_way_to_seconds_since_1970() -> None:
+    dates = [f"2024-04-23_12:39:08:{k}82522" for k in range(3)]
+    alone = guess_time({"column 1": dates, "u": ["1", "2", "3"]})
+    assert alone is not None
+    assert (alone.column, alone.unit) == ("column 1", "datetime")
+    seconds = ["1713868748.08", "1713868748.18", "1713868748.28"]
+    both = guess_time({"column 1": dates, "current_time": seconds})
+    assert both is not None
+    assert (both.column, both.unit) == ("current_time", "s")
+    # A date that states its zone is as good, and of a time that is written once a second most rows are late.
+    zoned = guess_time({"column 1": [f"{date[:19]}+02:00" for date in dates], "current_time": seconds})
+    coarse = guess_time(
+        {"column 1": [*dates, "2024-04-23_12:39:08:382522"], "fix_time": [seconds[0]] * 2 + [seconds[2]] * 2}
+    )
+    assert [one.column if one else None for one in (zoned, coarse)] == ["column 1", "column 1"]
 
 
 def test_fractions_without_leading_zeros_are_recognised_by_order() -> None:
@@ -432,7 +451,8 @@ def test_reading_twice_does_not_count_twice(tmp_path: Path) -> None:
         ("a.csv", "a,b\n1,2\n1,2\n", None, "looks like a time"),
         ("a.csv", "c,d\n0.5,2\n1,1\n1.5,3\n", None, "it may be c (by 0.5), which rises from row to row. Fix: "),
         ("a.csv", "time,u\n0,1\n1,2\n", TableLayout(time="tiem"), 'Did you mean "time"?'),
-        ("a.csv", "time;u\n0;1\n1;2\n", TableLayout(time="time"), "separator"),
+        ("a.csv", "time;u\n0;1\n1;2\n", TableLayout(time="time"), 'Fix: add separator = ";" under [table]'),
+        ("a.csv", "time\tu\n0\t1\n1\t2\n", TableLayout(time="time"), 'Fix: add separator = "\\t" under [table]'),
         ("a.csv", "time,u\n0,1\n1,2\n", TableLayout(time="c", columns=("a", "b", "c")), "3 column names but 2 fields"),
         ("a.csv", "time,u\nx,1\ny,2\n", TableLayout(time="time"), "readable time"),
         ("a.csv", "time,u\n0,1\n", TableLayout(time="time", time_unit="datetime"), "readable time"),

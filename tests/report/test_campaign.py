@@ -13,6 +13,7 @@ from ferryid.diagnose.judging.diagnosis import Diagnosis, Withheld
 from ferryid.diagnose.judging.finding import Estimate
 from ferryid.diagnose.judging.hidden_gain import HiddenGain
 from ferryid.diagnose.judging.hidden_signal import with_gains
+from ferryid.effects.wording import MEANS_LITTLE
 from ferryid.report.campaign import _sizes
 from ferryid.report.diagnosis_page import as_text, render
 from ferryid.report.diagnosis_report import as_json, report
@@ -214,3 +215,28 @@ def test_a_delay_of_one_log_has_its_interval_the_right_way_round() -> None:
     late = {"seconds": Estimate(-0.8, -0.87, -0.76, "s")}
     assert numbers_of(late, "clock_offset") == "delay of the velocity after the position 0.80 s (0.76 to 0.87)"
     assert numbers_of(late, "payload") == "delay -0.80 s (-0.87 to -0.76)"
+
+
+def idle_campaign() -> tuple[list[Diagnosis], str]:
+    """Return a campaign whose vessel hardly follows the applied force, and the note on that."""
+    little = (
+        f"In these 3 logs together the applied forces accelerate the vessel by surge 0.05. {MEANS_LITTLE} Fix: look"
+    )
+    return [replace(one, notes=("Other.", little), gathered=(little,)) for one in campaign()], little
+
+
+def test_that_forces_mean_little_stands_right_below_the_headline() -> None:
+    several, little = idle_campaign()
+    text = as_text(several)
+    assert " ".join(text.split("\n\n")[1].split()) == f"note: {little}"
+    assert text.count("surge 0.05") == 1
+
+
+@pytest.mark.slow
+@pytest.mark.blank
+def test_that_forces_mean_little_stands_first_on_the_page(tmp_path: Path) -> None:
+    several, little = idle_campaign()
+    page = report(several, tmp_path).report.read_text(encoding="utf-8")
+    assert page.count(little) == 1
+    assert page.index('class="verdict') < page.index(little) < page.index("<h2>")
+    assert "Which logs take part" not in page

@@ -91,6 +91,11 @@ CASES = {
     "empty name of an actuator": ('name = "left"', 'name = ""@', 'cannot be named ""'),
     "source is no text": ('source = "made up for a test"', "source = 3@", "must be a string, found a number"),
     "unknown key": ("length_m = 5.0\nmass", "lenght_m = 5.0@\nmass", 'Did you mean "length_m"?'),
+    "key of another table": (
+        'name = "left"\n',
+        'name = "left"\ntime_constant_s = 0.5@\n',
+        'Fix: move it to the table of its order, such as [signals."left.speed.command"]',
+    ),
     "unknown table": ("[wind]", "[winds]@", 'unknown key "winds"'),
     "no mass": ("[hull]\nlength_m = 5.0\nmass_kg = 1000.0", "[hull]@\nlength_m = 5.0", 'lacks "mass_kg"'),
     "negative mass": ("mass_kg = 1000.0", "mass_kg = -1.0@", "must be above 0, found -1"),

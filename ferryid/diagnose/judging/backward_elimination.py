@@ -11,7 +11,7 @@ from ferryid.diagnose.inference.needed_correction import needed
 from ferryid.diagnose.inference.onset_estimation import is_brief
 from ferryid.diagnose.inference.search import is_negligible, prune
 from ferryid.diagnose.judging.axis_consistency import check_axis_consistency
-from ferryid.diagnose.judging.credibility import interval_doubt
+from ferryid.diagnose.judging.credibility import harm_alone, interval_doubt
 from ferryid.diagnose.judging.held_out import HeldOutEvidence, held_out_evidence
 from ferryid.diagnose.judging.rivals import (
     RivalComparison,
@@ -24,6 +24,7 @@ from ferryid.diagnose.judging.size_estimates import size_estimates
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.judging.unexplained import find_displaced
 from ferryid.effects.wording import listed
+from ferryid.types import AXES
 
 PLACEBO = (
     "a placebo (the same force at other times, or on mirrored headings) does as well on stretches kept from the fit"
@@ -146,6 +147,10 @@ def _fallen(problem: EstimationProblem, kept: Fit, proof: HeldOutEvidence | None
         if fallen:
             worst = min(fallen, key=lambda i: proof.proofs[i].beaten)
             return worst, PLACEBO
+        harms = [harm_alone(dict(zip(AXES, one.improvement.removed.tolist(), strict=True))) for one in proof.proofs]
+        if any(harms):
+            worst = max(range(len(harms)), key=lambda i: (bool(harms[i]), -proof.proofs[i].improvement.score))
+            return worst, harms[worst]
     # Beside what was found later, it may be hardly anything: nothing to tell, and no sign of another cause.
     idle = [i for i in questioned if is_negligible(problem, kept, i)]
     if idle:

@@ -42,6 +42,8 @@ class JudgedCampaign:
     bare, loss
         The logs without what is confirmed, under the same noise, and the loss of held-out blocks without and with it; None
         where nothing is confirmed.
+    undefended
+        Properties for which nothing on held-out stretches speaks: they are no hints.
     """
 
     conditions: JudgedConditions
@@ -49,6 +51,7 @@ class JudgedCampaign:
     change: ChangeTest | None = None
     bare: CampaignFit | None = None
     loss: tuple[HeldOutLoss, HeldOutLoss] | None = None
+    undefended: tuple[PropertyTest, ...] = ()
 
     @property
     def hull(self) -> CommonHull:
@@ -89,7 +92,8 @@ class JudgedCampaign:
     def notes(self) -> tuple[str, ...]:
         """What was tested over all logs, as sentences."""
         change = () if self.change is None else (self.change.says,)
-        return (*change, *(note(one, self.hull.place) for one in self.conditions.tests))
+        dropped = (f"{one.candidate.title} was considered, but dropped: {one.undefended}." for one in self.undefended)
+        return (*change, *dropped, *(note(one, self.hull.place) for one in self.conditions.tests))
 
     def claims(self, path: str) -> tuple[Claim, ...]:
         """Return what all logs together say of one of them, as findings."""
@@ -145,7 +149,9 @@ def judge_campaign(campaign: Campaign, place: Mapping[str, int], progress: Calla
         again = change.beside(beside[0].hull.fit, acting)
         # A change that conditions or properties beside it explain is none.
         change, (conditions, properties) = (again, beside) if again.confirmed else (None, (conditions, properties))
-    return JudgedCampaign(conditions, properties, change, *_without_confirmed(conditions))
+    hinted = tuple(one for one in properties if not one.undefended)
+    undefended = tuple(one for one in properties if one.undefended)
+    return JudgedCampaign(conditions, hinted, change, *_without_confirmed(conditions), undefended)
 
 
 def _judged(

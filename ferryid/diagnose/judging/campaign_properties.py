@@ -24,6 +24,7 @@ from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.campaign_evidence import Gain, held_out_loss
 from ferryid.diagnose.judging.credibility import (
     felt,
+    harm_alone,
     idle_in_campaign,
     interval_doubt,
     scaled_as_masses,
@@ -146,6 +147,19 @@ class PropertyTest:
                 f"on no axis does it remove {100.0 * JUDGING.least_removed:.0f} % of the held-out squared force error"
             )
         return ""
+
+    @property
+    def undefended(self) -> str:
+        """Why it is no hint either, as the end of a sentence: nothing on held-out stretches speaks for it. Empty where it is.
+
+        What the logs were fitted to may speak for it all the same, as for whatever bends a fit. Short delays average out over
+        windows of seconds: one that a controller cannot have caused is a hint without a share of the error.
+        """
+        if self.confirmed or self.beyond_feedback or self.improvement.max() >= JUDGING.least_hinted:
+            return ""
+        if harm := harm_alone(dict(zip(AXES, self.improvement.tolist(), strict=True))):
+            return harm
+        return "held-out stretches are not surely predicted better with it" if self.gain.low <= 0.0 else ""
 
     @property
     def confirmed(self) -> bool:

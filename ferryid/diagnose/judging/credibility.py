@@ -287,6 +287,16 @@ def worsened(removed: Mapping[str, float]) -> str:
     return f"it makes the held-out squared force error in {worst} {-100.0 * removed[worst]:.0f} % larger"
 
 
+def harm_alone(removed: Mapping[str, float]) -> str:
+    """Return on which axis predictions get worse while they get better on none, as the end of a sentence; else nothing.
+
+    What does so on stretches kept from the fit is no more than a way in which the fit bent.
+    """
+    gained = max((share for share in removed.values() if isfinite(share)), default=0.0)
+    harm = worsened(removed) if gained < JUDGING.least_hinted else ""
+    return f"{harm}, and on none smaller" if harm else ""
+
+
 def felt(made: CampaignFit, common: Floats, own: Floats) -> Floats:
     """Return how much of the measured acceleration what sets two estimates apart is, by axis, shape (logs, 3).
 

@@ -288,6 +288,13 @@ class JudgingThresholds:
         "size from which on, beside the hull model of a profile, it does not matter how little a finding removes",
         "tuned on cases of `ferryid prove`: wrong names that remove little are of up to 5.6, dead bands and offsets of more",
     )
+    least_hinted: float = threshold(
+        0.01,
+        "of the squared force error",
+        "held-out error that what makes another axis worse, or surely predicts no log better, must remove on some axis to be a "
+        "hint",
+        "convention: one per cent, the last digit of what is reported of it",
+    )
     idle_share: float = threshold(
         0.1,
         "of the recorded force",

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+
+import numpy as np
 
 from ferryid.errors import FerryIdError
 from ferryid.identify.contradictions import wrong_size
@@ -47,6 +49,36 @@ def unengaged(responses: Mapping[str, ForceResponse | None], profile: Profile) -
         "whether the actuators were engaged in this log, or give it a profile of its own"
         for path, one in without.items()
     }
+
+
+def pooled(responses: Sequence[ForceResponse | None]) -> ForceResponse | None:
+    """Return how the vessel accelerates in several logs together: means by their inverse variances, None where none is known.
+
+    Where logs scatter more than their own spreads explain, the spread of the mean is that of the scatter.
+    """
+    known = [one for one in responses if one is not None]
+    if not known:
+        return None
+    values, spreads, sigmas = (
+        np.array([getattr(one, name) for one in known]) for name in ("response", "spread", "sigmas")
+    )
+    there = np.isfinite(values) & (spreads > 0.0)
+    weights = np.where(there, 1.0 / np.where(there, spreads, 1.0) ** 2, 0.0)
+    total, count = weights.sum(axis=0), there.sum(axis=0)
+    able = count > 0
+    mean = np.where(
+        able, np.nansum(weights * np.where(there, values, 0.0), axis=0) / np.where(able, total, 1.0), np.nan
+    )
+    away = np.where(there, values - mean, 0.0)
+    scatter = np.sqrt(np.sum(weights * away**2, axis=0) / np.maximum(count - 1, 1))
+    return ForceResponse(
+        mean,
+        np.where(able, np.maximum(scatter, 1.0) / np.sqrt(np.where(able, total, 1.0)), np.nan),
+        # All logs have more freedom than any of them.
+        np.min(np.where(there, sigmas, np.inf), axis=0),
+        np.any([one.possible for one in known], axis=0),
+        known[0].share,
+    )
 
 
 def unanswered_force(response: ForceResponse | None, profile: Profile) -> str:

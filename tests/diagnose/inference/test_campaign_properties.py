@@ -428,3 +428,15 @@ def test_what_all_logs_say_of_a_delay_tells_whether_a_controller_could_have_made
         monkeypatch.setattr(judging, "tested", lambda *_, found=weighed: found)
         judged = judge_campaign(whole, {"0": 0, "1": 1, "2": 2}, no_progress)
         assert [claim.figures.beyond_feedback for claim in judged.claims("1")] == [beyond]
+
+
+def test_a_property_that_nothing_defends_is_told_and_no_finding(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = campaign(CALM, conditions=())
+    place = {"0": 0, "1": 1, "2": 2}
+    for improvement, dropped in ((np.array([0.0, 0.0, 0.4]), False), (np.array([0.0, 0.0, -0.3]), True)):
+        weighed = replace(late(0.4), out_of_step=None, improvement=improvement, evidence=0.5 * INFERENCE.prior_odds)
+        monkeypatch.setattr(judging, "judge_properties", lambda *_, found=weighed: (found,))
+        judged = judge_campaign(whole, place, no_progress)
+        assert (not judged.claims("1")) == dropped
+        told = [one for one in judged.notes if one.startswith("Time delay was considered, but dropped: it makes")]
+        assert bool(told) == dropped

@@ -17,6 +17,7 @@ from ferryid.diagnose.judging.backward_elimination import (
     _told,
     eliminate_backward,
 )
+from ferryid.diagnose.judging.held_out import held_out_evidence
 from ferryid.diagnose.judging.rivals import RivalComparison, RivalFit, with_both, without_companions
 from tests.diagnose.trials import sailed, trial_on
 
@@ -131,6 +132,21 @@ def test_what_helps_no_held_out_stretch_falls_and_is_told(problem: EstimationPro
     assert {one.key for one in told.fit.candidates} == {LOSS, FIRST}
     (sentence,) = told.dropped
     assert sentence == f"{negligible[0].effect.title} was considered, but dropped: {PLACEBO}."
+
+
+def test_what_makes_one_axis_worse_and_none_better_falls(problem: EstimationProblem) -> None:
+    kept = fit(problem, of(problem, LOSS, FIRST))
+    judged = held_out_evidence(problem.with_noise_of(kept), kept)
+    assert judged is not None
+    for removed, falls in (
+        ((-0.38, -0.07, -0.22), True),
+        ((-0.38, 0.2, -0.22), False),
+        ((-0.05, -0.05, -0.05), False),
+    ):
+        worse = replace(judged.proofs[1].improvement, removed=np.array(removed))
+        proofs = (judged.proofs[0], replace(judged.proofs[1], improvement=worse))
+        place, why = _fallen(problem.with_noise_of(kept), kept, replace(judged, proofs=proofs))
+        assert (place == 1 and "in surge 38 % larger, and on none smaller" in why) == falls
 
 
 def test_what_fell_for_one_reason_is_one_sentence() -> None:

@@ -17,12 +17,13 @@ from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging import campaign_properties, conclude
 from ferryid.diagnose.judging.campaign_conditions import ConditionTest
 from ferryid.diagnose.judging.campaign_evidence import Gain, HeldOutLoss
-from ferryid.diagnose.judging.campaign_properties import PropertyTest
+from ferryid.diagnose.judging.campaign_properties import OutOfStep, PropertyTest
 from ferryid.diagnose.judging.claims import Claim, Figures, Kind, LogFigures
 from ferryid.diagnose.judging.confidence_rules import apply_rules
 from ferryid.diagnose.judging.credibility import (
     RefittedHull,
     campaign_hull,
+    harm_alone,
     idle_actuators,
     idle_in_campaign,
     impossible_masses,
@@ -45,6 +46,7 @@ from ferryid.effects.force_model import COEFFICIENTS, ForceModel, Measurements, 
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.effects.wording import ALL_THRUSTERS
 from ferryid.models import Quantity, Source, StoredEffect
+from ferryid.signals.feedback import Feedback
 from ferryid.types import AXES
 from ferryid.vessel import load_profile
 from ferryid.vessel.dimensions import off_hull
@@ -434,6 +436,35 @@ def test_a_property_and_a_difference_that_are_not_credible_are_not_confirmed() -
     assert _doubt(idle, weak.effect, True, FERRY) == ""
     every = _doubt(replace(idle, instance=ALL_THRUSTERS), weak.effect, True, FERRY)
     assert every.startswith(f"the motion of group {idle.group} may not follow its recorded force at all")
+
+
+def test_a_property_for_which_no_held_out_stretch_speaks_is_no_hint() -> None:
+    weak = Candidate.of(effects()["thruster_gain"], "thruster1", FERRY)
+    likely, unlikely = Gain(40.0, 10.0, 70.0), Gain(4.0, -10.0, 20.0)
+    none, harm = np.array([0.0, 0.004, -0.1]), np.array([-0.01, 0.0, -0.3])
+
+    def test(gain: Gain, improvement: np.ndarray) -> PropertyTest:
+        return PropertyTest(weak, found("thruster_gain").parameters, 50.0, gain, (2, 3), improvement, ())
+
+    assert test(likely, np.array([0.5, 0.5, 0.5])).undefended == ""
+    # It removes little, but held-out stretches are surely predicted better.
+    assert test(likely, none).undefended == ""
+    assert not test(likely, none).confirmed
+    assert test(unlikely, none).undefended == "held-out stretches are not surely predicted better with it"
+    assert test(unlikely, np.array([0.0, 0.02, 0.0])).undefended == ""
+    assert "in yaw 30 % larger, and on none smaller" in test(likely, harm).undefended
+    # A delay that no controller can have caused averages out over windows.
+    beyond = OutOfStep(50.0, Feedback(0.0, 5.0))
+    assert replace(test(likely, harm), out_of_step=beyond).undefended == ""
+
+
+def test_harm_counts_alone_where_no_axis_gains() -> None:
+    assert harm_alone({"surge": -0.38, "sway": -0.07, "yaw": -0.22}) == (
+        "it makes the held-out squared force error in surge 38 % larger, and on none smaller"
+    )
+    assert harm_alone({"surge": -0.38, "sway": 0.02, "yaw": -0.22}) == ""
+    assert harm_alone({"surge": -0.1, "sway": float("nan"), "yaw": -0.1}) == ""
+    assert harm_alone({}) == ""
 
 
 def test_factors_on_all_actuators_are_one_on_the_masses() -> None:
