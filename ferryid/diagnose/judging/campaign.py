@@ -43,7 +43,7 @@ class JudgedCampaign:
         The logs without what is confirmed, under the same noise, and the loss of held-out blocks without and with it; None
         where nothing is confirmed.
     undefended
-        Properties for which nothing on held-out stretches speaks: they are no hints.
+        Properties against which held-out stretches speak: they are no hints.
     """
 
     conditions: JudgedConditions

@@ -150,16 +150,14 @@ class PropertyTest:
 
     @property
     def undefended(self) -> str:
-        """Why it is no hint either, as the end of a sentence: nothing on held-out stretches speaks for it. Empty where it is.
+        """Why it is no hint either, as the end of a sentence: held-out stretches speak against it. Empty where it is one.
 
-        What the logs were fitted to may speak for it all the same, as for whatever bends a fit. Short delays average out over
-        windows of seconds: one that a controller cannot have caused is a hint without a share of the error.
+        Short delays average out over windows of seconds: one that a controller cannot have caused is a hint without a share of
+        the error.
         """
-        if self.confirmed or self.beyond_feedback or self.improvement.max() >= JUDGING.least_hinted:
+        if self.confirmed or self.beyond_feedback:
             return ""
-        if harm := harm_alone(dict(zip(AXES, self.improvement.tolist(), strict=True))):
-            return harm
-        return "held-out stretches are not surely predicted better with it" if self.gain.low <= 0.0 else ""
+        return harm_alone(dict(zip(AXES, self.improvement.tolist(), strict=True)))
 
     @property
     def confirmed(self) -> bool:

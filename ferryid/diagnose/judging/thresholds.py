@@ -291,8 +291,7 @@ class JudgingThresholds:
     least_hinted: float = threshold(
         0.01,
         "of the squared force error",
-        "held-out error that what makes another axis worse, or surely predicts no log better, must remove on some axis to be a "
-        "hint",
+        "held-out error that what makes another axis worse must remove on some axis to be a hint",
         "convention: one per cent, the last digit of what is reported of it",
     )
     idle_share: float = threshold(
