@@ -11,6 +11,7 @@ from ferryid.diagnose.gathering import Sides, cause_of_split, sides_of, why_part
 from ferryid.diagnose.inference.stages import AveragedLog, average
 from ferryid.diagnose.judging.diagnosis import distinct
 from ferryid.effects.wording import listed
+from ferryid.errors import FerryIdError
 from ferryid.files import name_of_log
 from ferryid.side_by_side import over
 from ferryid.signals.usable import tried
@@ -23,9 +24,10 @@ def find_other_vessels(
 ) -> tuple[dict[str, str], tuple[str, ...]]:
     """Return the logs of another vessel among several, with what is said of each, and sentences on what may be another's.
 
-    Logs are another vessel's where they are fewer than the others and the hulls are apart (`Split.apart`). Where no common hull
-    fits for less, as after a change of load, or where the logs are two halves, nobody knows which to leave out: a sentence says
-    so. Logs that a campaign could not use are not judged.
+    Logs are another vessel's where they are fewer than the others and the hulls are apart (`Split.apart`); so is a single one
+    that a campaign would be parted from, unless a load or a weak thruster explains it. Where that does, or part of the logs
+    may be from before a change of the hull, or half of them are on either side, all are used and a sentence says so. Logs that
+    a campaign could not use are not judged.
 
     Parameters
     ----------
@@ -41,15 +43,15 @@ def find_other_vessels(
         return average(ScreenedLog(measured, measured.measurements, ()))
 
     made = over(lambda path: tried(unscreened, path), paths)
-    logs = [one for one in made if isinstance(one, AveragedLog)]
+    logs = [one for one in made if not isinstance(one, FerryIdError)]
     # Where all is well even with the errors of the sensors, there is no need to find them.
     if sides_of(logs, (), profile) is None:
         return {}, ()
     screened = over(lambda one: tried(lambda path: _screened(one, run), one.path), logs)
-    logs = list(with_common_sensors([one for one in screened if isinstance(one, AveragedLog)]))
+    logs = list(with_common_sensors([one for one in screened if not isinstance(one, FerryIdError)]))
     foreign: dict[str, str] = {}
     while (found := sides_of(logs, (), profile)) is not None:
-        if not found.split.apart or len(found.inside) == len(found.outside):
+        if not _of_another(found):
             return foreign, (_doubt(found, logs),)
         foreign |= {path: _foreign(found) for path in sorted(found.inside)}
         logs = [one for one in logs if one.path not in found.inside]
@@ -58,6 +60,13 @@ def find_other_vessels(
 
 def _screened(log: AveragedLog, run: RunContext) -> AveragedLog:
     return average(screen_sensors(log.screened.measured, run.progress))
+
+
+def _of_another(found: Sides) -> bool:
+    """Return whether the smaller side is that of another vessel."""
+    if len(found.inside) == len(found.outside):
+        return False
+    return found.split.apart or (len(found.inside) == 1 and found.split.change is None)
 
 
 def _foreign(found: Sides) -> str:

@@ -373,7 +373,7 @@ class JudgingThresholds:
         0.6,
         "-",
         "least distance of two hulls, over the larger, that is most of a hull, where the gain is sure but not by how much",
-        "tuned with the next on 1585 parts of real campaigns of one vessel and 150 with a log of another",
+        "tuned on 1585 parts of real campaigns of one vessel and 150 with a log of another, with the next",
     )
     split_error: float = threshold(
         1.3,
