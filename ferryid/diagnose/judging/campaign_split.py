@@ -170,13 +170,25 @@ def _found(campaign: Campaign, reference: Flags) -> Split | None:
     hidden = [one for one in bare if one.found and one.gain.low > 0.0] if campaign.conditions else []
     alike = _Logs(fit).alike()
     apart = [one for one in (*bare, *(_judged(fit, alike) if alike else ())) if one.apart]
-    best = [max(some, key=lambda one: one.gain.total) for some in (likely or hidden, apart) if some]
+    best = [max(some, key=lambda one: one.gain.total) for some in (likely or hidden, _fewest(apart)) if some]
     tried = list({one.inside.tobytes(): one for one in best}.values())
     if tried and campaign.conditions:
         # A wind or a current of one log must not look like another hull, nor hide one.
         made = estimate_campaign(campaign)
         tried = [one for one in (_beside(made, way) for way in tried) if one is not None]
     return max((one for one in tried if one.found), key=lambda one: one.gain.total, default=None)
+
+
+def _fewest(apart: Sequence[Split]) -> list[Split]:
+    """Return, of the ways to part logs that lie within the likeliest one, that of the fewest logs; none of none.
+
+    A log that says little of its hull is near to either part: it stays with the others unless it is apart by itself.
+    """
+    if not apart:
+        return []
+    likeliest = max(apart, key=lambda one: one.gain.total)
+    within = [one for one in apart if not np.any(one.inside & ~likeliest.inside)]
+    return [min(within, key=lambda one: (int(one.inside.sum()), -one.gain.total))]
 
 
 def _beside(made: CampaignFit, way: Split) -> Split | None:

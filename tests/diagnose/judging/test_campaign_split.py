@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -149,6 +149,19 @@ def test_hulls_that_share_little_are_apart_where_the_error_says_so_too(
 ) -> None:
     split = Split(np.array([True, False]), Gain(gain, low, 2.0 * gain), ratio, HullDistance(*hulls))
     assert split.apart == apart
+
+
+def test_a_log_that_is_near_to_either_part_stays_with_the_others() -> None:
+    """A zigzag that said little of its hull was parted from the others with a log of another vessel."""
+
+    def way(places: Sequence[int], gain: float) -> Split:
+        inside = np.isin(np.arange(6), places)
+        return Split(inside, Gain(gain, 0.5 * gain, 2.0 * gain), 1.2, HullDistance(90.0, 4.0, 0.6))
+
+    both, alone, other = way([4, 5], 217.0), way([5], 140.0), way([1], 90.0)
+    assert campaign_split._fewest([other, both, alone]) == [alone]
+    assert campaign_split._fewest([other, both]) == [both]
+    assert campaign_split._fewest([]) == []
 
 
 def with_odd_one(odd: Member) -> Campaign:
