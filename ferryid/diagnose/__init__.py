@@ -21,6 +21,7 @@ from ferryid.diagnose.judging.likeness import Likeness, Pair, likeness_as_json, 
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.judging.verdict import campaign_verdict, error_ratio, worse_axes
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose, diagnose_and_store
+from ferryid.diagnose.same_vessel import find_other_vessels
 from ferryid.diagnose.second_sources import Comparison, SecondSources
 from ferryid.diagnose.versus import Versus, compare_groups, versus_json
 
@@ -50,6 +51,7 @@ __all__ = [
     "diagnose",
     "diagnose_and_store",
     "error_ratio",
+    "find_other_vessels",
     "finding_as_json",
     "likeness_as_json",
     "parts_as_json",

@@ -34,6 +34,8 @@ OWN_HULLS = "The campaign is split: each side has a hull of its own, and a model
 STAY = "They stay together here: what changed between them is in neither group's differences, and widens what is not known."
 CAMPAIGN, REFERENCES = "campaign", "references"
 """What logs are left out of."""
+_VERSUS = "see what differs with ferryid diagnose OTHERS... --versus LOG..., or "
+"""What to do where a thruster or a load may be all that changed."""
 SHOWN_OVERLAPS = 3
 """Pairs of overlapping logs that are listed; the others are counted."""
 
@@ -54,13 +56,17 @@ class Gathered:
 
 @dataclass(frozen=True)
 class Group:
-    """Logs with one hull, the references that bring it too, what a reader must know of them; `copies`, `parts` as gathered."""
+    """Logs with one hull, the references that bring it too, what a reader must know of them; `copies`, `parts` as gathered.
+
+    `changed` are the paths of logs that share the hull beside a load or a loss of force in them alone, or in the others.
+    """
 
     logs: tuple[AveragedLog, ...]
     references: tuple[AveragedLog, ...] = ()
     notes: tuple[str, ...] = ()
     copies: tuple[tuple[str, str], ...] = ()
     parts: Mapping[str, tuple[LogPart, ...]] = field(default_factory=dict)
+    changed: frozenset[str] = frozenset()
 
 
 def gather(
@@ -306,33 +312,43 @@ def without_logs(references: Gathered, logs: Sequence[AveragedLog]) -> Gathered:
     return Gathered(kept, (*references.notes, *notes), references.copies)
 
 
-def part(gathered: Gathered, references: Gathered, profile: Profile, model: Model | None) -> tuple[Group, ...]:
-    """Return the logs in groups of one hull each, the latest last; one group where a common hull fits all."""
-    groups = _parts(gathered, references, profile, model)
+def part(
+    gathered: Gathered, references: Gathered, profile: Profile, model: Model | None, *, beside_change: bool = True
+) -> tuple[Group, ...]:
+    """Return the logs in groups of one hull each, the latest last; one group where a common hull fits all.
+
+    With `beside_change`, logs stay together that one hull fits beside a load or a loss of force in some of them.
+    """
+    groups = _parts(gathered, references, profile, model, beside_change)
     if len(groups) == 1:
         return groups
     return tuple(replace(one, notes=(*one.notes, OWN_HULLS)) for one in groups)
 
 
-def _parts(gathered: Gathered, references: Gathered, profile: Profile, model: Model | None) -> tuple[Group, ...]:
+def _parts(
+    gathered: Gathered, references: Gathered, profile: Profile, model: Model | None, beside_change: bool
+) -> tuple[Group, ...]:
     """Return the same without a word on what is made of them."""
     notes = (*gathered.notes, *references.notes)
     every = Group(gathered.logs, references.logs, notes, gathered.copies, gathered.parts)
     open_groups, closed = [every], list[Group]()
     while open_groups:
         group = open_groups.pop()
-        parts = _parted(group, profile, model)
-        if len(parts) == 1 and parts[0] is group:
+        found = sides_of(group.logs, group.references, profile, model)
+        if found is None:
             closed.append(group)
+        elif beside_change and found.split.change is not None and found.split.change.confirmed:
+            closed.append(replace(group, changed=found.inside))
         else:
-            open_groups += parts
+            open_groups += _parted(group, found)
     order = [id(gathered.logs[i]) for i in in_time(gathered.logs)]
     return tuple(sorted(closed, key=lambda group: max(order.index(id(one)) for one in group.logs)))
 
 
 def whole(gathered: Gathered, profile: Profile, model: Model | None) -> Gathered:
     """Return logs that are compared as one group, without one that no common hull fits; more of them stay, with a note."""
-    groups = _parts(gathered, Gathered(()), profile, model)
+    # What changed in some logs of a group would be taken for a difference between the groups.
+    groups = _parts(gathered, Gathered(()), profile, model, beside_change=False)
     if len(groups) == 1:
         return replace(gathered, logs=groups[0].logs, notes=groups[0].notes)
     left = {one.path for group in groups for one in group.logs}
@@ -341,20 +357,40 @@ def whole(gathered: Gathered, profile: Profile, model: Model | None) -> Gathered
     return replace(gathered, logs=kept, notes=notes)
 
 
-def _parted(group: Group, profile: Profile, model: Model | None) -> list[Group]:
-    brought = {one.path for one in group.references}
-    every = [*group.logs, *group.references]
-    assembled = assemble([every[i] for i in in_time(every)], profile, model, brought)
+@dataclass(frozen=True)
+class Sides:
+    """Logs that no common hull fits: how they are parted, and the paths of the smaller part and of the other."""
+
+    split: Split
+    inside: frozenset[str]
+    outside: frozenset[str]
+
+
+def sides_of(
+    logs: Sequence[AveragedLog], references: Sequence[AveragedLog], profile: Profile, model: Model | None = None
+) -> Sides | None:
+    """Return how logs and references fall into two parts that no common hull fits; None where one fits all that have a say."""
+    every = [*logs, *references]
+    assembled = assemble([every[i] for i in in_time(every)], profile, model, {one.path for one in references})
     if assembled is None:
-        return [group]
+        return None
     campaign, place = assembled
-    own = {one.path for one in group.logs}
+    own = {one.path for one in logs}
     paths = sorted(place, key=lambda path: place[path])
     split = find_split(campaign, np.array([path not in own for path in paths]))
     if split is None:
-        return [group]
-    inside = {path for path, one in zip(paths, split.inside.tolist(), strict=True) if one}
-    outside = set(paths) - inside
+        return None
+    inside = frozenset(path for path, one in zip(paths, split.inside.tolist(), strict=True) if one)
+    if split.change is not None:
+        names = tuple(name_of_log(paths[i]) for i in split.change.change.acting)
+        split = replace(split, change=replace(split.change, names=names))
+    return Sides(split, inside, frozenset(paths) - inside)
+
+
+def _parted(group: Group, found: Sides) -> list[Group]:
+    """Return the parts of a group of which no common hull fits all logs."""
+    split, inside, outside = found.split, found.inside, found.outside
+    own = {one.path for one in group.logs}
     if not own & inside:
         return [_without_references(group, inside, split)]
     if not own & outside:
@@ -365,7 +401,8 @@ def _parted(group: Group, profile: Profile, model: Model | None) -> list[Group]:
     return _halves(group, inside, outside, split)
 
 
-def _why(split: Split) -> str:
+def why_parted(split: Split) -> str:
+    """Return what speaks for two hulls, for the brackets of a sentence."""
     told = (
         f"held-out squared force error with one hull {split.ratio:.1f} times that with hulls of their own, likelihood of "
         f"held-out stretches {split.gain.total:+.0f} nat with these"
@@ -378,16 +415,27 @@ def _why(split: Split) -> str:
     )
 
 
+def cause_of_split(split: Split) -> str:
+    """Return what may set two parts of a campaign apart, as the end of a sentence, and in another one what would explain it."""
+    if split.apart:
+        return "another vessel, or its hull changed"
+    cause = "its hull, its load or the force of a thruster changed, or it is another vessel"
+    if split.change is None:
+        return cause
+    says = split.change.says.removesuffix(".")
+    return f"{cause}. One hull fits all of them beside this, as where they are of one vessel: {says}"
+
+
 def _names(group: Group, paths: Collection[str]) -> str:
     every = [one.path for one in (*group.logs, *group.references)]
     names = distinct([name_of_log(one) for one in every], every)
     return listed([name for name, path in zip(names, every, strict=True) if path in paths])
 
 
-def _without_references(group: Group, paths: set[str], split: Split) -> Group:
+def _without_references(group: Group, paths: Collection[str], split: Split) -> Group:
     note = (
-        f"Left out of the references: {_names(group, paths)}: no common hull fits the logs and them ({_why(split)}); another "
-        "vessel, or its hull or load changed. Fix: give recordings of the vessel as it is in the logs"
+        f"Left out of the references: {_names(group, paths)}: no common hull fits the logs and them ({why_parted(split)}); "
+        f"{cause_of_split(split)}. Fix: give recordings of the vessel as it is in the logs"
     )
     kept = tuple(one for one in group.references if one.path not in paths)
     return replace(group, references=kept, notes=(*group.notes, note))
@@ -395,14 +443,15 @@ def _without_references(group: Group, paths: set[str], split: Split) -> Group:
 
 def _left_out(group: Group, path: str, split: Split, others: int) -> Group:
     note = (
-        f"Left out of the campaign: {path}: no common hull fits it and the {counted(others, 'other log')} ({_why(split)}); "
-        "another vessel, or its hull or load changed. Fix: diagnose it with --each, or with the right profile, or leave it out"
+        f"Left out of the campaign: {path}: no common hull fits it and the {counted(others, 'other log')} "
+        f"({why_parted(split)}); {cause_of_split(split)}. Fix: {'' if split.apart else _VERSUS}diagnose it with --each, or "
+        "with the right profile, or leave it out"
     )
     kept = tuple(one for one in group.logs if one.path != path)
     return replace(group, logs=kept, notes=(*group.notes, note))
 
 
-def _halves(group: Group, inside: set[str], outside: set[str], split: Split) -> list[Group]:
+def _halves(group: Group, inside: frozenset[str], outside: frozenset[str], split: Split) -> list[Group]:
     """Return a group in two; logs that are too short to take part go with the one that is nearest among the logs."""
     judged = [k for k, one in enumerate(group.logs) if one.path in inside | outside]
 
@@ -416,8 +465,8 @@ def _halves(group: Group, inside: set[str], outside: set[str], split: Split) -> 
     parts = [tuple(one for one, here in zip(group.logs, chosen, strict=True) if here == side) for side in (True, False)]
     first, second = (_names(group, {one.path for one in logs}) for logs in parts)
     note = (
-        f"No common hull fits {first} on one side and {second} on the other ({_why(split)}). The hull or the load changed "
-        "between them, or one side is of another vessel. Fix: diagnose each side by itself, with its own profile"
+        f"No common hull fits {first} on one side and {second} on the other ({why_parted(split)}); "
+        f"{cause_of_split(split)}. Fix: {'' if split.apart else _VERSUS}diagnose each side by itself, with its own profile"
     )
     return [
         replace(

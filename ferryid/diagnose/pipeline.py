@@ -124,8 +124,8 @@ def diagnose_campaign(
     profile = settings.recorded(profile)
     references = _references(logs, profile, settings, run, join=join)
     groups = _groups(logs, references, profile, settings, run, join=join)
-    left_out = unused(logs, groups)
-    found = [replace(one, unused=left_out) for one in _diagnosed(groups, profile, settings, run)]
+    left_out = unused(logs, [one.group for one in groups])
+    found = [replace(one, unused=left_out) for one in _diagnosed(groups, settings, run)]
     place = {path: k for k, path in reversed(list(enumerate(logs)))}
     return tuple(sorted(found, key=lambda one: min(place[path] for path in one.paths)))
 
@@ -153,14 +153,15 @@ def _groups(
     run: RunContext,
     *,
     join: bool = False,
-) -> tuple[Group, ...]:
-    """Return the logs that can be used, in groups of one hull each."""
+) -> tuple[JudgedGroup, ...]:
+    """Return the logs that can be used, in groups of one hull each, and what these say together."""
     gathered = gather(logs, profile, run, withhold=settings.withhold, join=join)
     if references.logs:
         references = without_logs(references, gathered.logs)
     gathered, references = engaged(((CAMPAIGN, gathered), (REFERENCES, references)), profile)
     if settings.against is not None:
-        return (Group(gathered.logs, notes=gathered.notes, copies=gathered.copies),)
+        simulated = Group(gathered.logs, notes=gathered.notes, copies=gathered.copies)
+        return (_judged_group(simulated, profile, settings, run),)
     run.progress("comparing the sensors of the logs")
     screened = with_common_sensors([*gathered.logs, *references.logs])
     gathered, references = (
@@ -168,16 +169,34 @@ def _groups(
         for one, some in ((gathered, screened[: len(gathered.logs)]), (references, screened[len(gathered.logs) :]))
     )
     run.progress("comparing the hulls of the logs")
-    return part(gathered, references, profile, settings.model)
+    found = [_judged_group(one, profile, settings, run) for one in part(gathered, references, profile, settings.model)]
+    if any(one.unconfirmed for one in found):
+        # Without what changed in it, a log has no hull in common with the others.
+        groups = part(gathered, references, profile, settings.model, beside_change=False)
+        found = [_judged_group(one, profile, settings, run) for one in groups]
+    return tuple(found)
 
 
-def _diagnosed(
-    groups: Sequence[Group], profile: Profile, settings: DiagnosisSettings, run: RunContext
-) -> tuple[Diagnosis, ...]:
+@dataclass(frozen=True)
+class JudgedGroup:
+    """Logs with one hull, what they are compared with, and what they say together."""
+
+    group: Group
+    baseline: Baseline
+    together: JudgedCampaign | None
+
+    @property
+    def unconfirmed(self) -> bool:
+        """Whether logs are together only for a load or a loss of force in some of them that is not confirmed."""
+        change = None if self.together is None else self.together.change
+        return bool(self.group.changed) and (change is None or not change.confirmed)
+
+
+def _diagnosed(groups: Sequence[JudgedGroup], settings: DiagnosisSettings, run: RunContext) -> tuple[Diagnosis, ...]:
     """Return the diagnoses of all groups; that of the latest, which a model is stored of, last."""
     found = list[Diagnosis]()
-    for k, group in enumerate(groups):
-        baseline, together = _baseline(group, profile, settings, run)
+    for k, judged_group in enumerate(groups):
+        group, baseline, together = judged_group.group, judged_group.baseline, judged_group.together
         selected = over(partial(_selected, baseline, run), [log for log in group.logs if log.long_enough])
         judged = judge(selected, run.progress)
         made = conclude(group.logs, judged, baseline, together, (*group.notes, *_brought(group, together)))
@@ -216,18 +235,16 @@ def _brought(group: Group, together: JudgedCampaign | None) -> tuple[str, ...]:
     )
 
 
-def _baseline(
-    group: Group, profile: Profile, settings: DiagnosisSettings, run: RunContext
-) -> tuple[Baseline, JudgedCampaign | None]:
+def _judged_group(group: Group, profile: Profile, settings: DiagnosisSettings, run: RunContext) -> JudgedGroup:
     """Return what logs are compared with, and what the logs of a campaign say together."""
     if settings.against is not None:
-        return SimulationBaseline(learn_simulation(settings.against, profile, run)), None
+        return JudgedGroup(group, SimulationBaseline(learn_simulation(settings.against, profile, run)), None)
     brought = {one.path for one in group.references}
     assembled = assemble([*group.logs, *group.references], profile, settings.model, brought)
     if assembled is None:
-        return HullBaseline(profile, settings.model), None
-    together = judge_campaign(*assembled, run.progress)
-    return CampaignBaseline(profile, together.hull, settings.model), together
+        return JudgedGroup(group, HullBaseline(profile, settings.model), None)
+    together = judge_campaign(*assembled, run.progress, group.changed)
+    return JudgedGroup(group, CampaignBaseline(profile, together.hull, settings.model), together)
 
 
 def diagnose(
@@ -257,7 +274,7 @@ def diagnose(
     references = _references(logs, profile, settings, run)
 
     def by_itself(log: str) -> tuple[Diagnosis, ...]:
-        return _diagnosed(_groups([log], references, profile, settings, run), profile, settings, run)
+        return _diagnosed(_groups([log], references, profile, settings, run), settings, run)
 
     errors: dict[str, FerryIdError] = {}
     found = [one for several in usable(logs, by_itself, errors) for one in several]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ferryid.counts import counted
@@ -21,6 +21,9 @@ from ferryid.signals.stream import compact
 from ferryid.signals.usable import left_out_of, usable
 from ferryid.types import RunContext
 from ferryid.vessel.profile import Profile
+
+OddLogs = Callable[[Sequence[str]], tuple[Mapping[str, str], tuple[str, ...]]]
+"""Returns, of the paths of logs, those of another vessel with what is said of each, and sentences on what may be another's."""
 
 
 def read_logs(
@@ -46,7 +49,7 @@ def read_logs(
         For a log that cannot be used, with `usable_only` where none can, and one that is given twice.
     """
     if usable_only:
-        return _in_time(_usable(paths, profile, settings, run, {}, whole=whole))
+        return _in_time([one for _, one in _usable(paths, profile, settings, run, {}, whole=whole)])
     read = _reader(profile, settings, run, whole)
     return _in_time([read(path) for path in paths])
 
@@ -59,15 +62,23 @@ class UsableLogs:
     ----------
     opened
         The logs.
-    left_out
-        Why each of the others is left out, as sentences.
+    reasons
+        Why each of the others is left out, as a sentence, by its path.
+    doubts
+        Which of the logs may not be of one vessel with the others, as sentences.
     notes
         Which short logs are used as one, as a sentence.
     """
 
     opened: list[Opened]
-    left_out: tuple[str, ...] = ()
+    reasons: Mapping[str, str] = field(default_factory=dict)
+    doubts: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """The sentences on logs that are left out."""
+        return tuple(self.reasons.values())
 
     def beside(self, error: FerryIdError) -> str:
         """Return the message of what a fit of these logs was refused for, and that it was without the others."""
@@ -81,12 +92,17 @@ class UsableLogs:
 
 
 def usable_logs(
-    paths: Sequence[str], profile: Profile, settings: FitSettings, run: RunContext, whole: str = "fit"
+    paths: Sequence[str],
+    profile: Profile,
+    settings: FitSettings,
+    run: RunContext,
+    whole: str = "fit",
+    odd: OddLogs | None = None,
 ) -> UsableLogs:
     """Read several logs as `read_logs` does, without those that a fit cannot use and those whose actuators were not engaged.
 
     Short ones that follow each other without a break are read as one (`ferryid.signals.contiguous`), unless one of these cannot
-    be used. `whole` is what logs are left out of, as their sentences say.
+    be used. `whole` is what logs are left out of, as their sentences say; `odd` finds those of another vessel.
 
     Raises
     ------
@@ -96,6 +112,7 @@ def usable_logs(
     # Seconds count from the start of each log as it was given.
     joined = Contiguous(tuple(paths), {}) if run.ranges else contiguous(paths, profile)
     errors: dict[str, FerryIdError] = {}
+    doubts: tuple[str, ...] = ()
     try:
         found = _usable(joined.paths, profile, settings, run, errors)
         refused = bool(joined.parts.keys() & errors.keys())
@@ -107,7 +124,11 @@ def usable_logs(
         # A part that cannot be used takes no other with it.
         joined, errors = Contiguous(tuple(paths), {}), {}
         found = _usable(paths, profile, settings, run, errors)
-    return UsableLogs(_in_time(found), left_out_of(whole, errors), joined.notes)
+    if odd is not None and len(found) > 1:
+        foreign, doubts = odd([path for path, _ in found])
+        errors.update({path: FerryIdError(f"{path}: {why}") for path, why in foreign.items()})
+    opened = _in_time([one for path, one in found if path not in errors])
+    return UsableLogs(opened, dict(zip(errors, left_out_of(whole, errors), strict=True)), doubts, joined.notes)
 
 
 def _usable(
@@ -118,8 +139,11 @@ def _usable(
     errors: dict[str, FerryIdError],
     *,
     whole: bool = True,
-) -> list[Opened]:
-    """Return the logs of `usable_logs`, and put the errors of the others into `errors`; `whole` as of `read_logs`."""
+) -> list[tuple[str, Opened]]:
+    """Return the logs of `usable_logs` with their paths, and put the errors of the others into `errors`.
+
+    `whole` is as of `read_logs`.
+    """
     read, alone = _reader(profile, settings, run, whole), len(paths) == 1
     responses: dict[str, ForceResponse | None] = {}
 
@@ -131,7 +155,7 @@ def _usable(
 
     found = list(usable(paths, examined, errors, lambda made: comparable(made[1].track)))
     errors.update({path: FerryIdError(f"{path}: {why}") for path, why in unengaged(responses, profile).items()})
-    return [one for path, one in found if path not in errors]
+    return [(path, one) for path, one in found if path not in errors]
 
 
 def _response(one: Opened, profile: Profile, settings: FitSettings) -> ForceResponse | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import atan2, degrees, hypot
 from typing import Any
 
@@ -285,6 +285,8 @@ class FitOutcome:
         What else there is to know of the logs, as sentences.
     order_responses
         How orders are followed that no feedback goes with, as the logs show it.
+    logs_left_out
+        Why each log that is left out is, as a sentence, by its path; the sentences are warnings as well.
     """
 
     model: Model
@@ -304,6 +306,7 @@ class FitOutcome:
     condition_kinds: tuple[KindOutcome, ...] = ()
     notes: tuple[str, ...] = ()
     order_responses: tuple[EstimatedResponse, ...] = ()
+    logs_left_out: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def base_fits_already(self) -> float | None:

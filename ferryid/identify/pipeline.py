@@ -23,7 +23,7 @@ from ferryid.identify.fit_warnings import free_run_warnings, rest_warnings, unus
 from ferryid.identify.force_signs import refuse_reversed_forces
 from ferryid.identify.free_run_checks import free_run_checks
 from ferryid.identify.held_out_checks import held_out_checks, skill_checks
-from ferryid.identify.inputs import usable_logs
+from ferryid.identify.inputs import OddLogs, usable_logs
 from ferryid.identify.judged_split import judged_split
 from ferryid.identify.log_sums import folds_by_blocks, force_free_axes, sum_log
 from ferryid.identify.model_selection import Selection, select_model, windows_to_try
@@ -51,7 +51,13 @@ from ferryid.vessel.profile import Profile
 
 
 def fit_logs(
-    paths: Sequence[str], profile: Profile, settings: FitSettings, run: RunContext, *, name: str = ""
+    paths: Sequence[str],
+    profile: Profile,
+    settings: FitSettings,
+    run: RunContext,
+    *,
+    name: str = "",
+    odd: OddLogs | None = None,
 ) -> FitOutcome:
     """Fit a correction of the base model to one or more logs and judge it on rows it did not see.
 
@@ -67,6 +73,8 @@ def fit_logs(
         Output folder, progress, and whether to check every checksum of the logs.
     name
         Name of the model; the profile's where empty.
+    odd
+        Finds logs of another vessel among several, which are left out; none is sought where None.
 
     Raises
     ------
@@ -74,7 +82,7 @@ def fit_logs(
         For input that cannot be used, with file, cause and remedy. One of several logs is left out instead, with a warning.
     """
     name, settings = check_name(name or profile.name), settings.on(profile)
-    logs = usable_logs(paths, profile, settings, run)
+    logs = usable_logs(paths, profile, settings, run, odd=odd)
     responses = estimate_order_responses(logs.opened, profile, settings, run.progress)
     said = tuple(map(str, responses))
     try:
@@ -86,7 +94,11 @@ def fit_logs(
         late = type(error)(with_sentence(error, *said))
         raise type(error)(logs.beside(late)) from error
     return replace(
-        outcome, warnings=(*said, *outcome.warnings, *logs.left_out), order_responses=responses, notes=logs.notes
+        outcome,
+        warnings=(*said, *outcome.warnings, *logs.doubts, *logs.left_out),
+        order_responses=responses,
+        notes=logs.notes,
+        logs_left_out=logs.reasons,
     )
 
 

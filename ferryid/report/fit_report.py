@@ -85,8 +85,15 @@ def fit_and_report(
     FerryIdError
         For unusable input or an output folder that cannot be written; nothing half-written is left.
     """
+
+    def odd(paths: Sequence[str]) -> tuple[Mapping[str, str], tuple[str, ...]]:
+        # A fit of one log has no need of what diagnoses are made with, which takes a while to import.
+        from ferryid.diagnose import find_other_vessels
+
+        return find_other_vessels(paths, profile, run)
+
     with started(PageProcess, page) as process:
-        return _reported(fit_logs(logs, profile, settings, run, name=name), run, page, process)
+        return _reported(fit_logs(logs, profile, settings, run, name=name, odd=odd), run, page, process)
 
 
 def fit_archive_and_report(
@@ -153,6 +160,7 @@ def as_json(result: FitOutcome, stored: StoredModel, report: Path | None) -> dic
         "acceptance": result.acceptance.to_json(),
         "warnings": list(result.warnings),
         **({"notes": list(result.notes)} if result.notes else {}),
+        **({"logs_left_out": _left_out(result)} if result.logs_left_out else {}),
         "scores": result.scores.to_json(),
         "settings": {**model.settings, **model.scale},
         "free_run": {
@@ -178,6 +186,10 @@ def as_json(result: FitOutcome, stored: StoredModel, report: Path | None) -> dic
         **({"order_responses": [one.to_json() for one in result.order_responses]} if result.order_responses else {}),
         "report": None if report is None else str(report),
     }
+
+
+def _left_out(result: FitOutcome) -> list[dict[str, str]]:
+    return [{"log": path, "says": says} for path, says in result.logs_left_out.items()]
 
 
 def as_text(result: FitOutcome, stored: StoredModel, report: Path | None) -> str:

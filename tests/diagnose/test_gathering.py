@@ -28,13 +28,18 @@ from ferryid.diagnose.gathering import (
     whole,
     without_logs,
 )
+from ferryid.diagnose.inference.baselines import HullBaseline
+from ferryid.diagnose.inference.campaign import assemble
+from ferryid.diagnose.inference.sessions import in_time
 from ferryid.diagnose.inference.stages import AveragedLog
+from ferryid.diagnose.judging.campaign import judge_campaign
+from ferryid.diagnose.pipeline import JudgedGroup
 from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.effects.wording import MEANS_LITTLE
 from ferryid.errors import FerryIdError
 from ferryid.identify.engagement import ForceResponse, pooled
 from ferryid.simulate import parse_scenario, simulate, write_log
-from ferryid.types import IN_MEMORY
+from ferryid.types import IN_MEMORY, no_progress
 from ferryid.vessel import load_profile
 from tests.diagnose.trials import FERRY
 
@@ -103,6 +108,37 @@ def test_a_log_of_another_vessel_is_left_out(days: list[str], logs: tuple[Averag
     assert paths(group.logs) == days[:2]
     (note,) = group.notes
     assert note.startswith(f"Left out of the campaign: {days[2]}: no common hull fits it and the 2 other logs")
+
+
+def test_a_log_with_a_weak_thruster_stays_with_what_changed_in_it(
+    logs: tuple[AveragedLog, ...], days: list[str], tmp_path: Path
+) -> None:
+    """No common hull fits it, and beside the loss of force one does; a group that is compared has it left out with that."""
+    weak = str(tmp_path / "weak.mcap")
+    fault = '[[thrusters.faults]]\nthruster = "thruster1"\nfactor = 0.3\nfrom_s = 0\n'
+    write_log(simulate(parse_scenario(SCENARIO.format(day=0, hour=3) + fault, "weak"), 7), Path(weak))
+    extra = str(tmp_path / "run4.mcap")
+    write_log(simulate(parse_scenario(SCENARIO.format(day=0, hour=4), "run4"), 8), Path(extra))
+    every = Gathered((*logs[:2], *gather([weak, extra], FERRY, IN_MEMORY).logs))
+    (group,) = part(every, Gathered(()), FERRY, None)
+    assert (paths(group.logs), group.changed, group.notes) == ([*days[:2], weak, extra], {weak}, ())
+    assembled = assemble([every.logs[i] for i in in_time(every.logs)], FERRY)
+    assert assembled is not None
+    together = judge_campaign(*assembled, no_progress, group.changed)
+    assert together.change is not None
+    assert together.change.confirmed
+    assert together.change.says.startswith("thruster1 gave 3")
+    assert together.change.says.endswith(" % of the force that it had in the 3 other logs: in weak.mcap alone.")
+    assert [one.finding.effect for one in together.claims(weak)] == ["thruster_gain"]
+    assert together.claims(days[0]) == ()
+    assert not JudgedGroup(group, HullBaseline(FERRY, None), together).unconfirmed
+    assert JudgedGroup(group, HullBaseline(FERRY, None), replace(together, change=None)).unconfirmed
+    alone = whole(every, FERRY, None)
+    assert paths(alone.logs) == [*days[:2], extra]
+    (note,) = alone.notes
+    assert note.startswith(f"Left out of the campaign: {weak}: no common hull fits it and the 3 other logs (")
+    assert "One hull fits all of them beside this, as where they are of one vessel: thruster1 gave 3" in note
+    assert "Fix: see what differs with ferryid diagnose OTHERS... --versus LOG..., or diagnose it with --each" in note
 
 
 def test_references_of_another_vessel_are_left_out(days: list[str], logs: tuple[AveragedLog, ...]) -> None:

@@ -13,7 +13,7 @@ pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).resolve().parents[2]
 HOME = ROOT / "ferryid" / "diagnose"
-ORDER = ("data", "checks", "second_sources", "inference", "judging", "gathering", "pipeline", "versus")
+ORDER = ("data", "checks", "second_sources", "inference", "judging", "gathering", "same_vessel", "pipeline", "versus")
 """From the bottom to the top."""
 PACKAGES = (
     "ferryid.diagnose",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -222,6 +222,23 @@ def test_sweeps_leave_out_the_same_logs(given: Given) -> None:
     ):
         assert [log["name"] for log in found.logs] == ["one", "two"]
         assert [note.split(":")[0] for note in found.notes[-2:]] == ["Left out of the sweep"] * 2
+
+
+def test_logs_of_another_vessel_are_left_out_with_what_is_said_of_them(given: Given) -> None:
+    paths = given({"one": sound(1), "foreign": None, "other": sound(3), "two": sound(2)})
+
+    def odd(asked: Sequence[str]) -> tuple[Mapping[str, str], tuple[str, ...]]:
+        assert list(asked) == [paths[0], *paths[2:]]
+        return {paths[2]: "no common hull fits it. Fix: fit it by itself"}, ("One may be another's.",)
+
+    found = fit_logs(paths, PROFILE, QUICK, NOWHERE, odd=odd)
+    assert [log.motion.log for log in found.logs] == ["one", "two"]
+    said = f"Left out of the fit: {paths[2]}: no common hull fits it. Fix: fit it by itself"
+    assert list(found.logs_left_out) == [paths[1], paths[2]]
+    assert found.logs_left_out[paths[2]] == said
+    assert found.warnings[-3:] == ("One may be another's.", found.logs_left_out[paths[1]], said)
+    # There is nothing to compare one log with.
+    inputs.usable_logs(paths[:2], PROFILE, QUICK, NOWHERE, odd=odd)
 
 
 @pytest.mark.slow

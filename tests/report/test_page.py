@@ -172,6 +172,19 @@ def test_conditions_of_single_logs_stand_on_the_page_in_the_text_and_in_the_json
     assert [one["included"] for one in plain["condition_kinds"]] == [True, False]
 
 
+def test_logs_that_are_left_out_stand_in_the_json_and_on_the_page(result: FitOutcome, tmp_path: Path) -> None:
+    said = "Left out of the fit: b.csv: no common hull fits it and the 8 other logs. Fix: fit it by itself"
+    found = replace(result, warnings=(*result.warnings, said), logs_left_out={"b.csv": said})
+    stored = StoredModel(tmp_path / "1.json", found.model, current=False)
+    plain = json.loads(json.dumps(as_json(found, stored, None)))
+    assert plain["logs_left_out"] == [{"log": "b.csv", "says": said}]
+    schema = json.loads(files("ferryid.schemas").joinpath("fit.json").read_text(encoding="utf-8"))
+    jsonschema.validate(plain["logs_left_out"], schema["properties"]["logs_left_out"])
+    assert "logs_left_out" not in as_json(result, stored, None)
+    assert f'<div class="warning">{said}</div>' in render(found)[0]
+    assert f"warning: {said}" in as_text(found, stored, None).splitlines()
+
+
 def test_loads_of_single_logs_are_said_to_be_relative(result: FitOutcome, tmp_path: Path) -> None:
     load = LogCondition(
         "monday", "payload", "load", ("mass", "moment"), ("kg", "kg·m"), np.array([80.0, 0.0]), np.eye(2)

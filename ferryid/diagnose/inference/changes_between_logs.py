@@ -33,11 +33,12 @@ from ferryid.diagnose.inference.group_differences import (
 )
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.effects.wording import ALL_THRUSTERS
+from ferryid.types import Flags
 
 
 @dataclass(frozen=True)
 class Change:
-    """A load or a fault that acts in the logs before a time, or in those after it, beside everything else.
+    """A load or a fault that acts in some logs, as those before a time or those after it, beside everything else.
 
     Attributes
     ----------
@@ -48,13 +49,13 @@ class Change:
     contenders
         Other differences that were tried in its place.
     count
-        How many logs are before the time.
+        How many logs are before the time; None where the groups are not those before a time and after it.
     """
 
     candidate: Candidate
     fit: CampaignFit
     contenders: tuple[Contender, ...]
-    count: int
+    count: int | None = None
 
     @property
     def after(self) -> bool:
@@ -64,20 +65,19 @@ class Change:
     @property
     def scales_all(self) -> bool:
         """Whether it is a factor of all forces, as one on all of the hull would be."""
-        names = self.fit.campaign.members[0].windows.measurements.names
-        return self.candidate.effect.id in FAULTS and (self.candidate.instance == ALL_THRUSTERS or len(names) == 1)
+        return _scales_all(self.candidate, self.fit.campaign)
 
     @property
     def acting(self) -> tuple[int, ...]:
         """The places in the campaign of the logs in which it acts, in order of time."""
-        order = self.fit.campaign.order
-        return order[self.count :] if self.after else order[: self.count]
+        campaign = self.fit.campaign
+        return tuple(i for i in campaign.order if campaign.members[i].group == self.candidate.group)
 
     @property
     def others(self) -> tuple[int, ...]:
         """Those of the other logs."""
-        order = self.fit.campaign.order
-        return order[: self.count] if self.after else order[self.count :]
+        acting = set(self.acting)
+        return tuple(i for i in self.fit.campaign.order if i not in acting)
 
 
 @dataclass(frozen=True)
@@ -128,6 +128,33 @@ def find_change(made: CampaignFit) -> Change | None:
     if found is None or not _may_change(found.comparison.candidate):
         return None
     return Change(found.comparison.candidate, found.fit, found.contenders, count)
+
+
+def change_of_part(made: CampaignFit, inside: Flags) -> Change | None:
+    """Return a load or a fault that acts in some logs alone, or in the others; None where the evidence favours none.
+
+    One log by itself shows no scatter, so that this may be what sets any log apart from others: it is to be asked of logs that
+    are farther apart than that. A factor of all forces is none, as it does the same as one on all of the hull.
+
+    Parameters
+    ----------
+    made
+        What the logs say together, without such a change and without groups.
+    inside
+        Which of them, shape (L,).
+    """
+    made = estimate_campaign(made.campaign, noise=made.noise, begin=made)
+    grouped = replace(made, campaign=in_groups(made.campaign, [GROUPS[int(one)] for one in inside]))
+    changes = [
+        one for one in differences_of(grouped.campaign) if _may_change(one) and not _scales_all(one, grouped.campaign)
+    ]
+    found = likeliest_difference(grouped, changes)
+    return None if found is None else Change(found.comparison.candidate, found.fit, found.contenders)
+
+
+def _scales_all(one: Candidate, campaign: Campaign) -> bool:
+    names = campaign.members[0].windows.measurements.names
+    return one.effect.id in FAULTS and (one.instance == ALL_THRUSTERS or len(names) == 1)
 
 
 def _may_change(one: Candidate) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from ferryid.cached import cached_property
@@ -128,11 +128,14 @@ class JudgedCampaign:
         return self.bare.whole_force_model(i), self.hull.fit.whole_force_model(i)
 
 
-def judge_campaign(campaign: Campaign, place: Mapping[str, int], progress: Callable[[str], None]) -> JudgedCampaign:
+def judge_campaign(
+    campaign: Campaign, place: Mapping[str, int], progress: Callable[[str], None], changed: Collection[str] = ()
+) -> JudgedCampaign:
     """Judge what several logs say together.
 
     Conditions come first, then properties beside them, then a load or a loss of force that is in some of the logs. Beside a
     confirmed one, conditions and properties are judged from the beginning: what they stood in for would be counted twice.
+    `changed` are as of `judge_change`.
     """
     bare = estimate_campaign(bare_campaign(campaign))
 
@@ -141,7 +144,7 @@ def judge_campaign(campaign: Campaign, place: Mapping[str, int], progress: Calla
 
     conditions, properties = _judged(campaign, judged, progress)
     progress("weighing what may have changed between logs")
-    change = judge_change(conditions.hull.fit, place)
+    change = judge_change(conditions.hull.fit, place, changed)
     if change is not None and change.confirmed:
         acting = _begun(change.change.candidate, change.difference.estimates)
         parted = grouped_as(campaign, change.fit.campaign)

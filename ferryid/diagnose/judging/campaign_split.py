@@ -23,6 +23,7 @@ from ferryid.diagnose.inference.campaign_estimation import CampaignFit, estimate
 from ferryid.diagnose.inference.campaign_model import Campaign
 from ferryid.diagnose.inference.changes_between_logs import find_change
 from ferryid.diagnose.judging.campaign_evidence import Gain, held_out_blocks, without_conditions
+from ferryid.diagnose.judging.changes_between_logs import ChangeTest, judge_part
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.side_by_side import over
 from ferryid.types import Flags, Floats, Ints
@@ -66,6 +67,11 @@ class HullDistance:
         """True where that remains beside conditions that each log may have."""
         return self.evidence >= JUDGING.split_kept * JUDGING.split_evidence and self.share >= JUDGING.split_share
 
+    @property
+    def unlike(self) -> bool:
+        """True where equal hulls are hardly so far apart, and the difference is most of a hull."""
+        return self.still_far and self.share >= JUDGING.split_most
+
 
 NO_DISTANCE = HullDistance(0.0, 0.0, 0.0)
 
@@ -85,12 +91,15 @@ class Split:
         part, the greater of the two.
     hulls
         How far the hulls of the parts are apart.
+    change
+        A load or a loss of force in one part, beside which a common hull fits; None where nothing of that kind explains it.
     """
 
     inside: Flags
     gain: Gain
     ratio: float
     hulls: HullDistance = NO_DISTANCE
+    change: ChangeTest | None = None
 
     @property
     def likely(self) -> bool:
@@ -108,8 +117,15 @@ class Split:
 
     @property
     def apart(self) -> bool:
-        """True where they predict them far better, and the hulls are farther apart than logs of one vessel are."""
-        return self.found and self.gain.low >= JUDGING.split_surely and self.hulls.far
+        """True where they predict them far better, and the hulls are farther apart than logs of one vessel are.
+
+        A short log among noisy ones leaves the gain less sure, and the logs' scatter large. Hulls are apart there as well where
+        both what they differ by and what the common one leaves of the force error are more than in logs of one vessel.
+        """
+        if not self.found or self.gain.low <= 0.0:
+            return False
+        surely = self.gain.low >= JUDGING.split_surely and self.hulls.far
+        return surely or (self.ratio >= JUDGING.split_error and self.hulls.unlike)
 
 
 def find_split(campaign: Campaign, reference: Flags) -> Split | None:
@@ -128,8 +144,22 @@ def find_split(campaign: Campaign, reference: Flags) -> Split | None:
     split = _found(campaign, reference)
     if split is None:
         return None
-    change = find_change(estimate_campaign(campaign))
-    return split if change is None or change.scales_all else _found(change.fit.campaign, reference)
+    made = estimate_campaign(campaign)
+    change = find_change(made)
+    if change is not None:
+        return split if change.scales_all else _found(change.fit.campaign, reference)
+    return split if split.apart else _with_change(split, made, reference)
+
+
+def _with_change(split: Split, made: CampaignFit, reference: Flags) -> Split:
+    """Return a split with the load or the loss of force of one part that explains it, or what remains apart beside that."""
+    tested = judge_part(made, split.inside, [str(i) for i in range(len(split.inside))])
+    if tested is None:
+        return split
+    rest = _found(tested.fit.campaign, reference)
+    if rest is None:
+        return replace(split, change=tested)
+    return split if np.array_equal(rest.inside, split.inside) else rest
 
 
 def _found(campaign: Campaign, reference: Flags) -> Split | None:
@@ -140,13 +170,25 @@ def _found(campaign: Campaign, reference: Flags) -> Split | None:
     hidden = [one for one in bare if one.found and one.gain.low > 0.0] if campaign.conditions else []
     alike = _Logs(fit).alike()
     apart = [one for one in (*bare, *(_judged(fit, alike) if alike else ())) if one.apart]
-    best = [max(some, key=lambda one: one.gain.total) for some in (likely or hidden, apart) if some]
+    best = [max(some, key=lambda one: one.gain.total) for some in (likely or hidden, _fewest(apart)) if some]
     tried = list({one.inside.tobytes(): one for one in best}.values())
     if tried and campaign.conditions:
         # A wind or a current of one log must not look like another hull, nor hide one.
         made = estimate_campaign(campaign)
         tried = [one for one in (_beside(made, way) for way in tried) if one is not None]
     return max((one for one in tried if one.found), key=lambda one: one.gain.total, default=None)
+
+
+def _fewest(apart: Sequence[Split]) -> list[Split]:
+    """Return, of the ways to part logs that lie within the likeliest one, that of the fewest logs; none of none.
+
+    A log that says little of its hull is near to either part: it stays with the others unless it is apart by itself.
+    """
+    if not apart:
+        return []
+    likeliest = max(apart, key=lambda one: one.gain.total)
+    within = [one for one in apart if not np.any(one.inside & ~likeliest.inside)]
+    return [min(within, key=lambda one: (int(one.inside.sum()), -one.gain.total))]
 
 
 def _beside(made: CampaignFit, way: Split) -> Split | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,16 +12,16 @@ from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit
 from ferryid.diagnose.inference.campaign_properties import LOADS, without_property
 from ferryid.diagnose.inference.candidate import Candidate
-from ferryid.diagnose.inference.changes_between_logs import Change, find_change
+from ferryid.diagnose.inference.changes_between_logs import Change, change_of_part, find_change
 from ferryid.diagnose.judging.campaign_errors import LogErrors
 from ferryid.diagnose.judging.campaign_evidence import HeldOutLoss, held_out_loss
 from ferryid.diagnose.judging.difference import Difference
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.group_differences import judged_difference
 from ferryid.effects.payload import whereabouts
-from ferryid.effects.wording import ALL_THRUSTERS
+from ferryid.effects.wording import ALL_THRUSTERS, listed
 from ferryid.files import name_of_log
-from ferryid.types import AXES
+from ferryid.types import AXES, Flags
 
 
 @dataclass(frozen=True)
@@ -37,13 +37,13 @@ class ChangeTest:
     loss
         Of held-out blocks, without it and with it.
     names
-        Of the last log before the time and of the first one after it.
+        Of the last log before the time and of the first one after it, or of all in which it acts where there is no such time.
     """
 
     change: Change
     difference: Difference
     loss: tuple[HeldOutLoss, HeldOutLoss]
-    names: tuple[str, str]
+    names: tuple[str, ...]
 
     @property
     def fit(self) -> CampaignFit:
@@ -59,9 +59,14 @@ class ChangeTest:
     def says(self) -> str:
         """What it is, as sentences."""
         says = _load if self.change.candidate.effect.id in LOADS else _loss_of_force
-        others = f"in the {counted(len(self.change.others), 'log')} {'before' if self.change.after else 'after'}"
-        what, how = says(self.change, self.difference.estimates, others)
-        text = f"{what}: {how} between {self.names[0]} and {self.names[1]}."
+        rest = len(self.change.others)
+        if self.change.count is None:
+            what, _ = says(self.change, self.difference.estimates, f"in the {counted(rest, 'other log')}")
+            text = f"{what}: in {listed(self.names)} alone."
+        else:
+            others = f"in the {counted(rest, 'log')} {'before' if self.change.after else 'after'}"
+            what, how = says(self.change, self.difference.estimates, others)
+            text = f"{what}: {how} between {self.names[0]} and {self.names[1]}."
         return text if self.confirmed else f"{text} It is estimated, not confirmed: {self.difference.doubt}."
 
     def beside(self, made: CampaignFit, candidate: Candidate) -> ChangeTest:
@@ -110,20 +115,45 @@ def _loss_of_force(change: Change, estimates: Mapping[str, Estimate], others: st
     return f"{gave} {100.0 * estimates['factor'].value:.0f} % of the force that it had {others}", how
 
 
-def judge_change(made: CampaignFit, place: Mapping[str, int]) -> ChangeTest | None:
+def judge_change(made: CampaignFit, place: Mapping[str, int], changed: Collection[str] = ()) -> ChangeTest | None:
     """Find a load or a loss of force in some of the logs, and judge it; None where the evidence favours none.
 
-    `place` is which of the logs each path is.
+    Parameters
+    ----------
+    made
+        What the logs say together, without it.
+    place
+        Which of the logs each path is.
+    changed
+        Paths of logs that no hull fits that is common to them and the others, unless something of that kind acts in them.
     """
+    paths = {i: path for path, i in place.items()}
     change = find_change(made)
     if change is None:
-        return None
-    paths = {i: path for path, i in place.items()}
+        inside = np.array([paths[i] in changed for i in range(len(paths))])
+        return judge_part(made, inside, [name_of_log(paths[i]) for i in range(len(paths))]) if changed else None
+    assert change.count is not None
     last, first = (name_of_log(paths[i]) for i in made.campaign.order[change.count - 1 : change.count + 1])
     return _tested(change, (last, first))
 
 
-def _tested(change: Change, names: tuple[str, str]) -> ChangeTest:
+def judge_part(made: CampaignFit, inside: Flags, names: Sequence[str]) -> ChangeTest | None:
+    """Judge a load or a loss of force in some logs, or in the others; None where the evidence favours none.
+
+    Parameters
+    ----------
+    made
+        What the logs say together, without it.
+    inside
+        Which of them, shape (L,).
+    names
+        Those of all.
+    """
+    change = change_of_part(made, inside)
+    return None if change is None else _tested(change, tuple(names[i] for i in change.acting))
+
+
+def _tested(change: Change, names: tuple[str, ...]) -> ChangeTest:
     fit = change.fit
     difference = judged_difference(fit, change.candidate, change.contenders)
     loss = held_out_loss(without_property(fit, change.candidate)), held_out_loss(fit)

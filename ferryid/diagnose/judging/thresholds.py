@@ -381,6 +381,18 @@ class JudgingThresholds:
         "least squared distance of two hulls over the greatest of a log to the others of its part, by their expectations",
         "tuned on the same parts: 2.9 where the gain is nearly sure enough",
     )
+    split_most: float = threshold(
+        0.6,
+        "-",
+        "least distance of two hulls, over the larger, that is most of a hull, where the gain is sure but not by how much",
+        "tuned on 1585 parts of real campaigns of one vessel and 150 with a log of another, with the next",
+    )
+    split_error: float = threshold(
+        1.3,
+        "-",
+        "least held-out squared force error of a part with the common hull over that with its own, of such hulls",
+        "tuned on the same: 1.16 at most where one vessel's logs reach that gain and evidence, and half of the hull",
+    )
     split_scattering: int = threshold(
         3,
         "logs",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -133,6 +133,63 @@ def test_hulls_are_apart_where_all_figures_say_so(
     assert split.apart == apart
 
 
+@pytest.mark.parametrize(
+    ("gain", "low", "ratio", "hulls", "apart"),
+    [
+        (123.0, 47.0, 1.6, (63.0, 2.6, 0.73), True),
+        (79.0, 47.0, 1.6, (63.0, 2.6, 0.73), False),
+        (123.0, -1.0, 1.6, (63.0, 2.6, 0.73), False),
+        (123.0, 47.0, 1.2, (63.0, 2.6, 0.73), False),
+        (123.0, 47.0, 1.6, (52.0, 2.6, 0.73), False),
+        (123.0, 47.0, 1.6, (63.0, 2.6, 0.57), False),
+    ],
+)
+def test_hulls_that_share_little_are_apart_where_the_error_says_so_too(
+    gain: float, low: float, ratio: float, hulls: tuple[float, float, float], apart: bool
+) -> None:
+    split = Split(np.array([True, False]), Gain(gain, low, 2.0 * gain), ratio, HullDistance(*hulls))
+    assert split.apart == apart
+
+
+def test_a_log_that_is_near_to_either_part_stays_with_the_others() -> None:
+    """A zigzag that said little of its hull was parted from the others with a log of another vessel."""
+
+    def way(places: Sequence[int], gain: float) -> Split:
+        inside = np.isin(np.arange(6), places)
+        return Split(inside, Gain(gain, 0.5 * gain, 2.0 * gain), 1.2, HullDistance(90.0, 4.0, 0.6))
+
+    both, alone, other = way([4, 5], 217.0), way([5], 140.0), way([1], 90.0)
+    assert campaign_split._fewest([other, both, alone]) == [alone]
+    assert campaign_split._fewest([other, both]) == [both]
+    assert campaign_split._fewest([]) == []
+
+
+def with_odd_one(odd: Member) -> Campaign:
+    """Return five logs of one vessel, and another one."""
+    whole = groups((1.0, 1.0, 1.0), ("", "", ""))
+    members = (*whole.members[:5], odd)
+    return replace(whole, members=members, order=tuple(range(len(members))))
+
+
+def test_a_thruster_that_is_weak_in_one_log_explains_why_no_hull_fits() -> None:
+    split = find_split(with_odd_one(groups((1.0, 1.0, 0.4), ("", "", "")).members[5]), np.zeros(6, dtype=np.bool_))
+    assert split is not None
+    assert np.flatnonzero(split.inside).tolist() == [5]
+    assert split.change is not None
+    assert split.change.confirmed
+    assert split.change.difference.estimates["factor"].value == pytest.approx(0.4, abs=0.03)
+    assert split.change.says.startswith("thruster1 gave 4")
+    assert split.change.says.endswith(" % of the force that it had in the 5 other logs: in 5 alone.")
+
+
+def test_no_load_or_thruster_explains_another_vessel() -> None:
+    whole = with_odd_one(heavy(groups((1.0, 1.0, 1.0), ("", "", "")).members[5], 2.0))
+    split = find_split(whole, np.zeros(6, dtype=np.bool_))
+    assert split is not None
+    assert np.flatnonzero(split.inside).tolist() == [5]
+    assert split.change is None
+
+
 def test_hulls_that_a_wind_explains_are_not_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = campaign()
     inside = np.array([False, False, True])
@@ -198,3 +255,17 @@ def test_logs_of_another_tanker_are_found_among_recorded_ones(
         assert split is not None
         assert split.ratio < 2.5
         assert {path for path in paths if split.inside[place[path]]} == set(paths) & set(foreign)
+
+
+def test_a_log_of_another_tanker_is_found_among_zigzags(shared_data: Callable[[str], Path], tmp_path: Path) -> None:
+    """Zigzags hide either hull in noise, so that the gain is not sure by much."""
+    profile = load_profile("esso-osaka")
+    own = [str(one) for one in sorted(shared_data("esso_osaka/zigzag").glob("*.csv"))[:8]]
+    foreign = renamed(shared_data("kvlcc2") / "HSVA_CPMC_KVLCC2_Z_20_10_P.dat", tmp_path / "tank.csv")
+    for paths in ([*own, foreign], own):
+        assembled = assemble(averaged(paths, profile), profile)
+        assert assembled is not None
+        found, place = assembled
+        split = find_split(found, np.zeros(len(paths), dtype=np.bool_))
+        parted = set() if split is None else {path for path in paths if split.inside[place[path]]}
+        assert parted == set(paths) - set(own)
