@@ -161,7 +161,7 @@ def test_spreads_beside_bands_and_more_disturbances_than_a_loop_takes_are_those_
 ) -> None:
     n, h, noise, rng = 30, 0.4, TRUE[[0, 1, 2]], np.random.default_rng(7)
     turn = np.array([[np.cos(0.5), -np.sin(0.5)], [np.sin(0.5), np.cos(0.5)]])
-    blocks = block_diag(0.9 * turn, 0.8, 0.95, 0.7 * turn.T, 0.6)
+    blocks = block_diag(0.9 * turn, [[0.8]], [[0.95]], 0.7 * turn.T, [[0.6]])
     s = len(blocks)
     columns = rng.uniform(0.01, 0.03, (n, 3, s))
     # Of these two push on one channel alone, and one on none.
