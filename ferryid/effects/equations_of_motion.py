@@ -86,13 +86,13 @@ def other_forces(
     u: float,
     v: float,
     r: float,
-    hull: Floats,
+    damped: tuple[float, float, float],
     external: Floats,
     factor: Floats,
 ) -> tuple[float, float, float]:
-    """Return the forces on the hull in a row but the actuators': external ones, damping, and the Coriolis forces."""
+    """Return the forces on the hull in a row but the actuators': external ones, `damping`, and the Coriolis forces."""
     m11, m22, m23, m32, _ = mass
-    X, Y, N = damping(u, v, r, hull)
+    X, Y, N = damped
     much = 1.0 if factor.shape[0] == 0 else factor[i]
     c13, c23 = -m22 * v - 0.5 * (m23 + m32) * r, m11 * u
     return (
@@ -124,7 +124,7 @@ def acceleration_in(
 ) -> tuple[float, float, float]:
     """Return the acceleration through the water that the forces of a row give at a velocity through it."""
     mass = masses(i, hull, load)
-    X, Y, N = other_forces(i, mass, u, v, r, hull, external, factor)
+    X, Y, N = other_forces(i, mass, u, v, r, damping(u, v, r, hull), external, factor)
     for k in range(parts.shape[1]):
         X, Y, N = X + parts[i, k, 0], Y + parts[i, k, 1], N + parts[i, k, 2]
     return solved(mass, X, Y, N)
@@ -167,7 +167,7 @@ def required(
     for i in range(nu.shape[0]):
         u, v, r = relative(i, nu, flow)
         mass = masses(i, hull, load)
-        X, Y, N = other_forces(i, mass, u, v, r, hull, external, factor)
+        X, Y, N = other_forces(i, mass, u, v, r, damping(u, v, r, hull), external, factor)
         a, b, c = nu_dot[i, 0], nu_dot[i, 1], nu_dot[i, 2]
         if flow.shape[0] > 0:
             a, b = a - r * flow[i, 1], b + r * flow[i, 0]
@@ -203,8 +203,10 @@ def slopes(
     for i in range(nu.shape[0]):
         u, v, r = relative(i, nu, flow)
         products(u, v, r, product)
-        mass = masses(i, hull, load)
-        X, Y, N = other_forces(i, mass, u, v, r, hull, external, factor)
+        mass, damped = masses(i, hull, load), damping(u, v, r, hull)
+        m11, m22, m23, m32, m33 = mass
+        det = m22 * m33 - m23 * m32
+        X, Y, N = other_forces(i, mass, u, v, r, damped, external, factor)
         thrust_X, thrust_Y, thrust_N = 0.0, 0.0, 0.0
         for k in range(parts.shape[1]):
             thrust_X, thrust_Y, thrust_N = (
@@ -219,14 +221,19 @@ def slopes(
             if k < MASSES:
                 moved[k] = hull[k] + moves[q]
                 other = masses(i, moved, load)
-                X, Y, N = other_forces(i, other, u, v, r, hull, external, factor)
+                X, Y, N = other_forces(i, other, u, v, r, damped, external, factor)
                 there = solved(other, X + thrust_X, Y + thrust_Y, N + thrust_N)
                 moved[k] = hull[k]
                 out[i, 0, q], out[i, 1, q], out[i, 2, q] = there[0] - here[0], there[1] - here[1], there[2] - here[2]
             else:
                 push, axis = moves[q] * much * product[k - MASSES], DAMPED[k - MASSES]
-                X, Y, N = push if axis == 0 else 0.0, push if axis == 1 else 0.0, push if axis == 2 else 0.0
-                out[i, 0, q], out[i, 1, q], out[i, 2, q] = solved(mass, X, Y, N)
+                # As `solved`, of a force along one axis: what divides takes most of the time.
+                if axis == 0:
+                    out[i, 0, q], out[i, 1, q], out[i, 2, q] = push / m11, 0.0, 0.0
+                elif axis == 1:
+                    out[i, 0, q], out[i, 1, q], out[i, 2, q] = 0.0, m33 * push / det, -(m32 * push) / det
+                else:
+                    out[i, 0, q], out[i, 1, q], out[i, 2, q] = 0.0, -(m23 * push) / det, m22 * push / det
     return out
 
 

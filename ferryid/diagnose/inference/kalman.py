@@ -20,16 +20,14 @@ CONVERGED = 1e-9
 """Change of gains, as a share of the largest, below which they stay as they are."""
 FEW = 5
 """Series up to which `errors` takes them one after the other."""
-WIDE = 48
-"""States of a filter for which its loops are compiled; with more it is slower."""
+WIDE = 24
+"""States of a filter for which its loops are compiled: three channels' with waves and gusts; with more it is slower."""
 DIFFUSE = 2
 """Steps after which position and velocity are known."""
 
 
 @borrowing
-def move_on(
-    x: Floats, q: int, keep: Floats, blocks: Floats, columns: Floats, k: int, step_s: float, scratch: Floats
-) -> None:
+def move_on(x: Floats, q: int, keep: Floats, blocks: Floats, columns: Floats, k: int, step_s: float) -> None:
     """Move q columns of states on by a step, in place.
 
     Parameters
@@ -41,27 +39,41 @@ def move_on(
     keep
         Of each channel: what moves the error and its rate on, row by row, and what is kept of the disturbance, shape (c, 5).
     blocks
-        Transition of the shared states, shape (s, s).
+        Transition of the shared states, shape (s, s), of which each depends on itself and at most on one beside it.
     columns
         Acceleration of every channel by each of these, shape (n, c, s).
     k
         Which of the n.
     step_s
         Step [s].
-    scratch
-        Room for the shared states, shape (s, q or more).
     """
     c, s = columns.shape[1], columns.shape[2]
-    h, half = step_s, 0.5 * step_s * step_s
+    h, half, shared = step_s, 0.5 * step_s * step_s, CHANNEL_STATES * c
     for j in range(c):
         i = CHANNEL_STATES * j
-        for b in range(s):
-            part = columns[k, j, b]
-            # The second state of a disturbance in a narrow band pushes nothing itself.
+        first, second, third, fourth, fade = keep[j, 0], keep[j, 1], keep[j, 2], keep[j, 3], keep[j, 4]
+        # The second state of a disturbance in a narrow band pushes nothing itself. Up to three push in one loop: a loop each
+        # takes longer to begin than to run.
+        at, one, two, three = 0, 0.0, 0.0, 0.0
+        a, b, d = shared, shared, shared
+        while at < s and three == 0.0:
+            part = columns[k, j, at]
+            if part != 0.0:
+                if one == 0.0:
+                    one, a = part, shared + at
+                elif two == 0.0:
+                    two, b = part, shared + at
+                else:
+                    three, d = part, shared + at
+            at += 1
+        if one != 0.0:
+            for m in range(q):
+                x[i, m] = x[i, m] + half * (one * x[a, m]) + half * (two * x[b, m]) + half * (three * x[d, m])
+        for rest in range(at, s):
+            part = columns[k, j, rest]
             if part != 0.0:
                 for m in range(q):
-                    x[i, m] += half * (part * x[CHANNEL_STATES * c + b, m])
-        first, second, third, fourth, fade = keep[j, 0], keep[j, 1], keep[j, 2], keep[j, 3], keep[j, 4]
+                    x[i, m] += half * (part * x[shared + rest, m])
         for m in range(q):
             # Read all, then write all: only so is this loop vectorised.
             place, speed, wrong, rate, push = x[i, m], x[i + 1, m], x[i + 2, m], x[i + 3, m], x[i + 4, m]
@@ -70,22 +82,28 @@ def move_on(
             x[i + 2, m] = first * wrong + second * rate
             x[i + 3, m] = third * wrong + fourth * rate
             x[i + 4, m] = fade * push
-        for b in range(s):
-            part = columns[k, j, b]
+        if one != 0.0:
+            for m in range(q):
+                x[i + 1, m] = x[i + 1, m] + h * (one * x[a, m]) + h * (two * x[b, m]) + h * (three * x[d, m])
+        for rest in range(at, s):
+            part = columns[k, j, rest]
             if part != 0.0:
                 for m in range(q):
-                    x[i + 1, m] += h * (part * x[CHANNEL_STATES * c + b, m])
-    for i in range(s):
-        for m in range(q):
-            scratch[i, m] = 0.0
-        for b in range(s):
-            part = blocks[i, b]
-            if part != 0.0:
-                for m in range(q):
-                    scratch[i, m] += part * x[CHANNEL_STATES * c + b, m]
-    for i in range(s):
-        for m in range(q):
-            x[CHANNEL_STATES * c + i, m] = scratch[i, m]
+                    x[i + 1, m] += h * (part * x[shared + rest, m])
+    i = 0
+    while i < s:
+        if i + 1 < s and (blocks[i, i + 1] != 0.0 or blocks[i + 1, i] != 0.0):
+            first, second, third, fourth = blocks[i, i], blocks[i, i + 1], blocks[i + 1, i], blocks[i + 1, i + 1]
+            for m in range(q):
+                along, across = x[shared + i, m], x[shared + i + 1, m]
+                x[shared + i, m] = first * along + second * across
+                x[shared + i + 1, m] = third * along + fourth * across
+            i += 2
+        else:
+            fade = blocks[i, i]
+            for m in range(q):
+                x[shared + i, m] *= fade
+            i += 1
 
 
 @compiled
@@ -139,7 +157,7 @@ def gains(
         _run_narrow(*given, K, spread)
     else:
         P, Q, turned = (np.zeros((S, S)) for _ in range(3))
-        run_covariances(*given, P, Q, turned, np.zeros((c, S)), np.zeros((s, S)), K, spread)
+        run_covariances(*given, P, Q, turned, np.zeros((c, S)), K, spread)
     return K, spread
 
 
@@ -160,12 +178,10 @@ def _run_narrow(
 
     Rows lie at distances that are known when this is compiled: only so are loops over several of them vectorised.
     """
-    S, c, s = K.shape[2], columns.shape[1], columns.shape[2]
+    S, c = K.shape[2], columns.shape[1]
     P, Q, turned = np.zeros((S, WIDE)), np.zeros((S, WIDE)), np.zeros((S, WIDE))
-    sights, scratch = np.zeros((c, WIDE)), np.zeros((s, WIDE))
-    run_covariances(
-        scale, noise, integrals, blocks, drive, columns, step_s, keep, P, Q, turned, sights, scratch, K, spread
-    )
+    sights = np.zeros((c, WIDE))
+    run_covariances(scale, noise, integrals, blocks, drive, columns, step_s, keep, P, Q, turned, sights, K, spread)
 
 
 @borrowing
@@ -182,7 +198,6 @@ def run_covariances(
     Q: Floats,
     turned: Floats,
     sights: Floats,
-    scratch: Floats,
     K: Floats,
     spread: Floats,
 ) -> None:
@@ -194,14 +209,15 @@ def run_covariances(
         As given to it.
     keep
         From `kept`.
-    P, Q, turned, sights, scratch
-        Zeros, S columns of which are used: covariance, what enters over a step, room for P, shape (S, S or more), for what a
-        channel sees, shape (c, S or more), and for shared states, shape (s, S or more).
+    P, Q, turned, sights
+        Zeros, S columns of which are used: covariance, what enters over a step, room for P, shape (S, S or more), and for what
+        a channel sees, shape (c, S or more). The columns beyond stay zero; loops take them along where that makes them as long
+        as is known when they are compiled.
     K, spread
         Shapes (n, c, S) and (n, c).
     """
     n, c, s = columns.shape
-    S, h, known = CHANNEL_STATES * c + s, step_s, 0 if integrals == 2 else 1
+    S, h, known, width = CHANNEL_STATES * c + s, step_s, 0 if integrals == 2 else 1, P.shape[1]
     for j in range(c):
         i = CHANNEL_STATES * j
         vague = (1e3 * scale[j]) ** 2
@@ -224,11 +240,11 @@ def run_covariances(
         # One measurement after the other; what the ones before have told is taken off the rows that the next one looks at.
         for j in range(c):
             at, wrong_ = CHANNEL_STATES * j + known, CHANNEL_STATES * j + 2
-            for i in range(S):
+            for i in range(width):
                 sights[j, i] = P[at, i] + P[wrong_, i]
             for before in range(j):
                 gain = K[k, before, at] + K[k, before, wrong_]
-                for i in range(S):
+                for i in range(width):
                     sights[j, i] -= gain * sights[before, i]
             variance = sights[j, at] + sights[j, wrong_] + noise[j, 0] * noise[j, 0]
             spread[k, j] = np.sqrt(variance)
@@ -238,23 +254,25 @@ def run_covariances(
         if c == 3:
             for i in range(S):
                 first, second, third = K[k, 0, i], K[k, 1, i], K[k, 2, i]
-                for m in range(S):
+                for m in range(width):
                     P[i, m] = P[i, m] - first * sights[0, m] - second * sights[1, m] - third * sights[2, m]
         else:
             for i in range(S):
                 for j in range(c):
                     gain = K[k, j, i]
-                    for m in range(S):
+                    for m in range(width):
                         P[i, m] -= gain * sights[j, m]
         # F P F' by moving the columns, then the rows: P is symmetric.
-        move_on(P, S, keep, blocks, columns, k, h, scratch)
+        move_on(P, width, keep, blocks, columns, k, h)
         for i in range(S):
             for m in range(S):
                 turned[m, i] = P[i, m]
-        move_on(turned, S, keep, blocks, columns, k, h, scratch)
+        move_on(turned, width, keep, blocks, columns, k, h)
         for i in range(S):
-            for m in range(i + 1):
+            for m in range(width):
                 P[i, m] = turned[i, m] + Q[i, m]
+        for i in range(S):
+            for m in range(i):
                 P[m, i] = P[i, m]
         if s == 0 and k > 0:
             change, largest = 0.0, 0.0
@@ -338,7 +356,7 @@ def _errors_of_many(
     S = CHANNEL_STATES * c + s
     known = 0 if integrals == 2 else 1
     keep = kept(noise, step_s)
-    x, error, scratch = np.zeros((S, q)), np.empty(q), np.empty((s, q))
+    x, error = np.zeros((S, q)), np.empty(q)
     out, begun = np.zeros((n, c, q)), 0
     for k in range(n):
         begun = begun_by(series, k, begun)
@@ -351,7 +369,7 @@ def _errors_of_many(
                 gain = K[k, j, i]
                 for m in range(begun):
                     x[i, m] += gain * error[m]
-        move_on(x, begun, keep, blocks, columns, k, step_s, scratch)
+        move_on(x, begun, keep, blocks, columns, k, step_s)
     return out
 
 
@@ -447,6 +465,41 @@ def gains_alone(
     return K, spread
 
 
+Followed = tuple[tuple[float, float], float, float, float, float, float]
+"""What a channel's accelerations sum up to, as a velocity and as a position, and the five states of its filter."""
+
+
+@borrowing
+def _followed(
+    state: Followed,
+    gap: float,
+    K: Floats,
+    k: int,
+    j: int,
+    keep: Floats,
+    integrals: int,
+    h: float,
+    half: float,
+) -> tuple[Followed, float]:
+    """Return the states of a channel one step later, and the prediction error, of its acceleration in that step."""
+    (reached, way), p, v, w, r, u = state
+    reached += gap
+    there = reached * h
+    if integrals == 2:
+        way += there
+        there = way * h
+    error = there - (p if integrals == 2 else v) - w
+    p += K[k, j, 0] * error
+    v += K[k, j, 1] * error
+    w += K[k, j, 2] * error
+    r += K[k, j, 3] * error
+    u += K[k, j, 4] * error
+    p += h * v + half * u
+    v += h * u
+    w, r = keep[j, 0] * w + keep[j, 1] * r, keep[j, 2] * w + keep[j, 3] * r
+    return ((reached, way), p, v, w, r, keep[j, 4] * u), error
+
+
 @compiled
 def whitened_alone(
     gaps: Floats, runs: Ints, K: Floats, spread: Floats, noise: Floats, integrals: int, step_s: float
@@ -474,30 +527,26 @@ def whitened_alone(
     out, keep = np.zeros((n, c, q)), kept(noise, step_s)
     h, half = step_s, 0.5 * step_s * step_s
     if q == 1:
-        # States that stay in registers.
+        # States that stay in registers; of three channels side by side, as each step of one waits for the step before.
+        rest = ((0.0, 0.0), 0.0, 0.0, 0.0, 0.0, 0.0)
         for run in range(runs.shape[0]):
             first = runs[run, 0]
-            for j in range(c):
-                a, b, d, e, fade = keep[j, 0], keep[j, 1], keep[j, 2], keep[j, 3], keep[j, 4]
-                reached, way, p, v, w, r, u = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            if c == 3:
+                one, two, three = rest, rest, rest
                 for k in range(first, runs[run, 1]):
-                    reached += gaps[k, j, 0]
-                    there = reached * h
-                    if integrals == 2:
-                        way += there
-                        there = way * h
-                    error = there - (p if integrals == 2 else v) - w
+                    one, error = _followed(one, gaps[k, 0, 0], K, k, 0, keep, integrals, h, half)
+                    two, other = _followed(two, gaps[k, 1, 0], K, k, 1, keep, integrals, h, half)
+                    three, third = _followed(three, gaps[k, 2, 0], K, k, 2, keep, integrals, h, half)
+                    if k >= first + DIFFUSE:
+                        out[k, 0, 0], out[k, 1, 0] = error / spread[k, 0], other / spread[k, 1]
+                        out[k, 2, 0] = third / spread[k, 2]
+                continue
+            for j in range(c):
+                one = rest
+                for k in range(first, runs[run, 1]):
+                    one, error = _followed(one, gaps[k, j, 0], K, k, j, keep, integrals, h, half)
                     if k >= first + DIFFUSE:
                         out[k, j, 0] = error / spread[k, j]
-                    p += K[k, j, 0] * error
-                    v += K[k, j, 1] * error
-                    w += K[k, j, 2] * error
-                    r += K[k, j, 3] * error
-                    u += K[k, j, 4] * error
-                    p += h * v + half * u
-                    v += h * u
-                    w, r = a * w + b * r, d * w + e * r
-                    u *= fade
         return out
     series, total, moved = np.empty(q), np.empty(q), np.empty(q)
     place, speed, wrong, rate, push = np.empty(q), np.empty(q), np.empty(q), np.empty(q), np.empty(q)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.linalg import toeplitz
+from scipy.linalg import block_diag, toeplitz
 from scipy.stats import chi2, multivariate_normal
 
 from ferryid.diagnose.inference.autoregression import ORDER, AutoregressiveNoise
@@ -18,6 +18,7 @@ from ferryid.diagnose.inference.kalman import (
     WIDE,
     errors,
     gains,
+    kept,
     predictions_alone,
     summed,
     whitened_alone,
@@ -152,6 +153,42 @@ def test_series_are_filtered_alike_in_any_number_and_from_where_they_begin(integ
         )
         # Its first value, of the channel that is looked at first, is all that it is off.
         np.testing.assert_allclose(together[4 * m, 0, m] * spread[4 * m, 0], series[4 * m, 0, m], rtol=1e-12)
+
+
+@pytest.mark.parametrize("integrals", [2, 1], ids=["positions", "velocities"])
+def test_spreads_beside_bands_and_more_disturbances_than_a_loop_takes_are_those_of_dense_matrices(
+    integrals: int,
+) -> None:
+    n, h, noise, rng = 30, 0.4, TRUE[[0, 1, 2]], np.random.default_rng(7)
+    turn = np.array([[np.cos(0.5), -np.sin(0.5)], [np.sin(0.5), np.cos(0.5)]])
+    blocks = block_diag(0.9 * turn, [[0.8]], [[0.95]], 0.7 * turn.T, [[0.6]])
+    s = len(blocks)
+    columns = rng.uniform(0.01, 0.03, (n, 3, s))
+    # Of these two push on one channel alone, and one on none.
+    columns[:, 1:, 1], columns[:, :2, 4], columns[:, :, 2] = 0.0, 0.0, 0.0
+    drive = np.stack([np.eye(s) - blocks @ blocks.T, np.eye(s)])
+    _, spread = gains(np.ones(3), noise, integrals, blocks, drive, columns, h)
+
+    move, entering, P = block_diag(*[np.eye(5)] * 3, blocks), np.zeros((15 + s, 15 + s)), np.zeros((15 + s, 15 + s))
+    keep, see = kept(noise, h), np.zeros((3, 15 + s))
+    entering[15:, 15:], P[15:, 15:] = drive
+    for j, (_, wrong, error_s, pushed, _) in enumerate(noise):
+        i, known = 5 * j, 0 if integrals == 2 else 1
+        see[j, [i + known, i + 2]] = 1.0
+        move[i : i + 2, i : i + 5] = [[1.0, h, 0.0, 0.0, 0.5 * h * h], [0.0, 1.0, 0.0, 0.0, h]]
+        move[i + 2 : i + 4, i + 2 : i + 4], move[i + 4, i + 4] = keep[j, :4].reshape(2, 2), keep[j, 4]
+        P[i : i + 5, i : i + 5] = np.diag([0.0, 1e6, wrong**2, (wrong / error_s) ** 2, pushed**2])
+        if integrals == 2:
+            P[i, i], P[i + 1, i + 1] = 1e6, 1e6 / h**2
+        own = slice(i + 2, i + 5)
+        entering[own, own] = P[own, own] - move[own, own] @ P[own, own] @ move[own, own].T
+    for k in range(n):
+        seen = see @ P @ see.T + np.diag(noise[:, 0] ** 2)
+        np.testing.assert_allclose(spread[k], np.diag(np.linalg.cholesky(seen)), rtol=1e-4)
+        P = P - P @ see.T @ np.linalg.solve(seen, see @ P)
+        for j in range(3):
+            move[5 * j, 15:], move[5 * j + 1, 15:] = 0.5 * h * h * columns[k, j], h * columns[k, j]
+        P = move @ P @ move.T + entering
 
 
 @pytest.mark.slow
