@@ -166,7 +166,7 @@ def _unanswered(logs: Sequence[AveragedLog], profile: Profile) -> tuple[str, ...
     what, _, remedy = (together or why).partition(". Fix: ")
     more = len(several) - 1
     also = f" So it is in {counted(more, 'more log')}." if more > 0 and not together else ""
-    whose = f"In these {len(logs)} logs together" if together else f"{name_of_log(path)}:"
+    whose = f"In these {counted(len(logs), 'log')} together" if together else f"{name_of_log(path)}:"
     return (f"{whose} {what}. {MEANS_LITTLE}{also} Fix: see whether the actuators were engaged, or {remedy}",)
 
 

@@ -10,7 +10,7 @@ from typing import ClassVar
 from scipy.stats import beta
 
 from ferryid.effects import effects
-from ferryid.effects.wording import IS_A_HINT, listed, titled
+from ferryid.effects.wording import IS_A_HINT, MEANS_LITTLE, listed, titled
 from ferryid.json_record import Record
 from ferryid.validation.records import UNKNOWN, CaseResult, Finding, Key
 
@@ -27,8 +27,6 @@ DROPPED = " considered, but dropped: "
 """What stands in a note between an effect and why it is none."""
 NOT_TESTED, SINCE = "Not tested: ", ", since "
 """How a note begins on effects that were not tested, and what stands before the reason."""
-UNFOLLOWED = "What is found of forces in such a log means little."
-"""Part of a note on a log whose vessel does not follow its actuators."""
 SMALLEST, TO_SHOW = "Would have been seen with an even chance, from: ", "To make sure: "
 """What stands before the least sizes that a comparison of groups shows, and before what would show an effect."""
 
@@ -202,7 +200,7 @@ def _why_not_found(result: CaseResult, key: Key) -> str:
             what, _, why = note.removeprefix(NOT_TESTED).partition(SINCE)
             if name in what.lower():
                 return f"not tested, since {why.removesuffix('.')}"
-        if UNFOLLOWED in note:
+        if MEANS_LITTLE in note:
             return "the vessel hardly follows the applied force in this log"
         if note.startswith(SMALLEST):
             parts = (one.partition(", ") for one in note.removeprefix(SMALLEST).removesuffix(".").split("; "))

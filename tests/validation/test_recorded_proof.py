@@ -24,7 +24,6 @@ from ferryid.validation.name_scores import (
     SINCE,
     SMALLEST,
     TO_SHOW,
-    UNFOLLOWED,
     why_missed,
 )
 from ferryid.validation.recorded.case_sampling import NotMade
@@ -323,7 +322,7 @@ def test_what_the_recording_has_of_an_effect_may_cancel_it() -> None:
 
 
 @pytest.mark.parametrize(
-    "words", [NOT_CONFIRMED, NO_HULL_MODEL, DROPPED, NOT_TESTED, SINCE, UNFOLLOWED, SMALLEST, TO_SHOW]
+    "words", [NOT_CONFIRMED, NO_HULL_MODEL, DROPPED, NOT_TESTED, SINCE, SMALLEST, TO_SHOW]
 )
 def test_reasons_are_found_by_words_that_the_diagnosis_has(words: str) -> None:
     sources = Path(diagnose.__file__).parent.rglob("*.py")
