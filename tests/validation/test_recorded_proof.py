@@ -270,7 +270,7 @@ def test_why_effects_of_twice_the_oracles_size_were_missed_stands_on_the_page() 
     ("notes", "why"),
     [
         (["Not tested: fouling and thruster force, since there is none."], "not tested, since there is none"),
-        (["b.bag: too large. What is found of forces in such a log means little."], "the vessel hardly follows"),
+        (["b.bag: too large. What is found of forces in such logs means little."], "the vessel hardly follows"),
         (
             ["Would have been seen with an even chance, from: Payload, mass 3 kg; Thruster force (port), factor 33 %."],
             "the logs show it with an even chance from factor 33 % on",
@@ -321,9 +321,7 @@ def test_what_the_recording_has_of_an_effect_may_cancel_it() -> None:
     assert why(0.9, 0.15) == ["", ""]
 
 
-@pytest.mark.parametrize(
-    "words", [NOT_CONFIRMED, NO_HULL_MODEL, DROPPED, NOT_TESTED, SINCE, SMALLEST, TO_SHOW]
-)
+@pytest.mark.parametrize("words", [NOT_CONFIRMED, NO_HULL_MODEL, DROPPED, NOT_TESTED, SINCE, SMALLEST, TO_SHOW])
 def test_reasons_are_found_by_words_that_the_diagnosis_has(words: str) -> None:
     sources = Path(diagnose.__file__).parent.rglob("*.py")
     assert any(words in one.read_text("utf-8") for one in sources)
