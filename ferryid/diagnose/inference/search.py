@@ -135,12 +135,18 @@ def search(
     while True:
         taken = {candidate.key for candidate in chosen.candidates}
         left = [candidate for candidate in steady if candidate.key not in taken]
-        # What all actuators that are too weak by one factor do as well, in fewer parameters, is decided first.
-        left = [candidate for candidate in left if needed(problem, candidate)] or left
-        progress(f"weighing {len(left)} hypotheses beside {len(taken) or 'none'} found")
-        found = _ranked_candidates(problem, chosen, left, about)
+        # What all actuators that are too weak by one factor do as well, in fewer parameters, is decided first. A log that does
+        # not call for it, as where a moment of inertia is guessed too large, still shows the others.
+        first = [candidate for candidate in left if needed(problem, candidate)]
+        found, good = list[ScoredCandidate](), list[ScoredCandidate]()
+        for some in filter(None, (first, [candidate for candidate in left if candidate not in first])):
+            progress(f"weighing {len(some)} hypotheses beside {len(taken) or 'none'} found")
+            found += _ranked_candidates(problem, chosen, some, about)
+            good = [one for one in found if one.gain > INFERENCE.prior_odds and not is_negligible(problem, one.fit)]
+            if good:
+                break
+        found.sort(key=lambda one: -one.gain)
         rounds.append(_round(found))
-        good = [one for one in found if one.gain > INFERENCE.prior_odds and not is_negligible(problem, one.fit)]
         best = _common_cause(problem, good) if good and len(taken) < INFERENCE.most_effects else None
         if best is None:
             chosen = prune(problem, chosen)

@@ -147,9 +147,10 @@ def _fallen(problem: EstimationProblem, kept: Fit, proof: HeldOutEvidence | None
         if fallen:
             worst = min(fallen, key=lambda i: proof.proofs[i].beaten)
             return worst, PLACEBO
-        harms = [harm_alone(dict(zip(AXES, one.improvement.removed.tolist(), strict=True))) for one in proof.proofs]
-        if any(harms):
-            worst = max(range(len(harms)), key=lambda i: (bool(harms[i]), -proof.proofs[i].improvement.score))
+        gains = {i: proof.proofs[i].improvement for i in questioned}
+        harms = {i: harm_alone(dict(zip(AXES, one.removed.tolist(), strict=True))) for i, one in gains.items()}
+        if harmful := [i for i in questioned if harms[i]]:
+            worst = min(harmful, key=lambda i: gains[i].score)
             return worst, harms[worst]
     # Beside what was found later, it may be hardly anything: nothing to tell, and no sign of another cause.
     idle = [i for i in questioned if is_negligible(problem, kept, i)]

@@ -16,6 +16,7 @@ from ferryid.diagnose.inference.search import search
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.backward_elimination import eliminate_backward
 from ferryid.effects import effects
+from ferryid.simulate import parse_scenario, simulate, write_log
 from ferryid.types import no_progress
 from ferryid.validation.case import Case
 from ferryid.validation.log_generation import generate
@@ -56,6 +57,18 @@ def test_the_weak_thruster_is_named_beside_the_hull(tmp_path: Path, thruster: st
     assert kept.keys == {("hull_parameters", None), ("thruster_gain", thruster)}
     values = dict(zip([one.effect.id for one in kept.candidates], kept.values, strict=True))
     assert values["thruster_gain"][0] == pytest.approx(0.75, abs=0.03)
+
+
+def test_a_guessed_inertia_that_is_too_large_hides_no_wind(tmp_path: Path) -> None:
+    """The model is right and the rigid body's inertia is not: no coefficient is wanting, and what acts is found without."""
+    blown = f"{CALM}[environment.wind]\nnorth_mps = -3.0\neast_mps = 2.0\n"
+    log = tmp_path / "blown.mcap"
+    write_log(simulate(parse_scenario(blown, "blown"), 3), log)
+    guessed = replace(FERRY, hull=replace(FERRY.hull, inertia_z=1.5 * FERRY.hull.inertia_z))
+    problem = trial_on(read_measurements(str(log), guessed)[0])
+    known = [Candidate.of(effects()[name], None, guessed) for name in ("hull_parameters", "wind")]
+    assert needed(problem, known[0])
+    assert search(problem, no_progress, known=known).fit.keys == {("wind", None)}
 
 
 def test_what_no_hull_has_is_less_than_its_rigid_body(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import pytest
 
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, fit, starting_point, without
 from ferryid.diagnose.inference.search import list_candidates, search
+from ferryid.diagnose.judging import backward_elimination
 from ferryid.diagnose.judging.backward_elimination import (
     BRIEF,
     LAW,
@@ -147,6 +148,18 @@ def test_what_makes_one_axis_worse_and_none_better_falls(problem: EstimationProb
         proofs = (judged.proofs[0], replace(judged.proofs[1], improvement=worse))
         place, why = _fallen(problem.with_noise_of(kept), kept, replace(judged, proofs=proofs))
         assert (place == 1 and "in surge 38 % larger, and on none smaller" in why) == falls
+
+
+def test_a_correction_that_is_needed_does_not_fall_for_harm(
+    problem: EstimationProblem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept = fit(problem, of(problem, LOSS, FIRST))
+    judged = held_out_evidence(problem.with_noise_of(kept), kept)
+    assert judged is not None
+    monkeypatch.setattr(backward_elimination, "needed", lambda _, one: one.key == FIRST)
+    worse = replace(judged.proofs[1].improvement, removed=np.array((-0.38, -0.07, -0.22)))
+    proofs = (judged.proofs[0], replace(judged.proofs[1], improvement=worse))
+    assert _fallen(problem.with_noise_of(kept), kept, replace(judged, proofs=proofs)) == (None, "")
 
 
 def test_what_fell_for_one_reason_is_one_sentence() -> None:
