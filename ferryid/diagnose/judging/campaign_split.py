@@ -122,7 +122,7 @@ class Split:
         A short log among noisy ones leaves the gain less sure, and the logs' scatter large. Hulls are apart there as well where
         both what they differ by and what the common one leaves of the force error are more than in logs of one vessel.
         """
-        if not self.found or self.gain.low <= 0.0:
+        if self.change is not None or not self.found or self.gain.low <= 0.0:
             return False
         surely = self.gain.low >= JUDGING.split_surely and self.hulls.far
         return surely or (self.ratio >= JUDGING.split_error and self.hulls.unlike)
@@ -146,9 +146,11 @@ def find_split(campaign: Campaign, reference: Flags) -> Split | None:
         return None
     made = estimate_campaign(campaign)
     change = find_change(made)
-    if change is not None:
-        return split if change.scales_all else _found(change.fit.campaign, reference)
-    return split if split.apart else _with_change(split, made, reference)
+    if change is not None and change.scales_all:
+        return split
+    left = split if change is None else _found(change.fit.campaign, reference)
+    # What changed at a time may be no more than the best that a time makes of what is in a single log.
+    return None if left is None else _with_change(left, made, reference)
 
 
 def _with_change(split: Split, made: CampaignFit, reference: Flags) -> Split:
@@ -157,6 +159,9 @@ def _with_change(split: Split, made: CampaignFit, reference: Flags) -> Split:
     if tested is None:
         return split
     rest = _found(tested.fit.campaign, reference)
+    if split.apart:
+        # A thruster that gives hardly any force in a log bends its hull as far. Only what is confirmed is that.
+        return replace(split, change=tested) if rest is None and tested.confirmed else split
     if rest is None:
         return replace(split, change=tested)
     return split if np.array_equal(rest.inside, split.inside) else rest

@@ -128,10 +128,11 @@ def judge_change(made: CampaignFit, place: Mapping[str, int], changed: Collectio
         Paths of logs that no hull fits that is common to them and the others, unless something of that kind acts in them.
     """
     paths = {i: path for path, i in place.items()}
-    change = find_change(made)
+    inside = np.array([paths[i] in changed for i in range(len(paths))])
+    part = judge_part(made, inside, [name_of_log(paths[i]) for i in range(len(paths))]) if changed else None
+    change = None if part is not None and part.confirmed else find_change(made)
     if change is None:
-        inside = np.array([paths[i] in changed for i in range(len(paths))])
-        return judge_part(made, inside, [name_of_log(paths[i]) for i in range(len(paths))]) if changed else None
+        return part
     assert change.count is not None
     last, first = (name_of_log(paths[i]) for i in made.campaign.order[change.count - 1 : change.count + 1])
     return _tested(change, (last, first))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -180,6 +181,31 @@ def test_a_thruster_that_is_weak_in_one_log_explains_why_no_hull_fits() -> None:
     assert split.change.difference.estimates["factor"].value == pytest.approx(0.4, abs=0.03)
     assert split.change.says.startswith("thruster1 gave 4")
     assert split.change.says.endswith(" % of the force that it had in the 5 other logs: in 5 alone.")
+
+
+def test_what_changed_at_a_time_beside_it_hides_no_weak_thruster_of_one_log(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The best that a time makes of one log leaves it apart: a load from the third log on stood in for a thruster in it."""
+    whole = with_odd_one(groups((1.0, 1.0, 0.4), ("", "", "")).members[5])
+    load = SimpleNamespace(scales_all=False, fit=SimpleNamespace(campaign=whole))
+    monkeypatch.setattr(campaign_split, "find_change", lambda _: load)
+    split = find_split(whole, np.zeros(6, dtype=np.bool_))
+    assert split is not None
+    assert split.change is not None
+    assert split.change.says.startswith("thruster1 gave 4")
+
+
+def test_a_thruster_that_gives_hardly_any_force_is_no_other_vessel_however_far_the_hulls_are_apart() -> None:
+    none = np.zeros(6, dtype=np.bool_)
+    for odd, weak in ((groups((1.0, 1.0, 0.2), ("", "", "")), True), (groups((1.0, 1.0, 1.0), ("", "", "")), False)):
+        member = odd.members[5] if weak else heavy(odd.members[5], 2.0)
+        whole = with_odd_one(member)
+        found = campaign_split._found(whole, none)
+        assert found is not None
+        far = replace(found, gain=Gain(200.0, 100.0, 300.0), hulls=HullDistance(90.0, 5.0, 0.7))
+        assert far.apart
+        split = campaign_split._with_change(far, estimate_campaign(whole), none)
+        assert (split.change is not None) == weak
+        assert split.apart != weak
 
 
 def test_no_load_or_thruster_explains_another_vessel() -> None:
