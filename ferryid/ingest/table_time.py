@@ -113,13 +113,17 @@ def guess_time(sample: Mapping[str, Sequence[str]]) -> TimePlan | None:
         if has_time_word(name) and (numbers := _rising(values, strict=False)) is not None and np.ptp(numbers) > 0.0
     }
     # A date without a zone may be of any, seconds since 1970 are not.
-    since_1970 = any(
-        _counts_from_1970(name, numbers) and 2 * len(set(sample[name])) > len(sample[name])
+    since_1970 = [
+        name
         for name, numbers in found.items()
-    )
+        if _counts_from_1970(name, numbers) and 2 * len(set(sample[name])) > len(sample[name])
+    ]
     for name, values in sample.items():
         if _are_datetimes(values) and not (since_1970 and _unzoned(values)):
             return _plan(sample, name, "datetime", "date and time")
+        if since_1970 and _are_datetimes(values):
+            # What gives way to them is not to be lost to a time of something else.
+            found = {one: found[one] for one in (*since_1970, *found)}
     if found:
         name, others = next(iter(found)), list(found)[1:]
         plan = _plan(sample, name, *_unit_of(_without_unit(name)[1], found[name]))

@@ -260,6 +260,12 @@ def test_dates_without_a_zone_give_way_to_seconds_since_1970() -> None:
     both = guess_time({"column 1": dates, "current_time": seconds})
     assert both is not None
     assert (both.column, both.unit) == ("current_time", "s")
+    # Not to a time of something else that stands before these.
+    counted = {"column 1": dates, "time_in_mode": ["10.08", "10.18", "10.28"], "current_time": seconds}
+    since = guess_time(counted)
+    assert since is not None
+    assert since.column == "current_time"
+    assert '"time_in_mode" may be it too' in since.note
     # A date that states its zone is as good, and of a time that is written once a second most rows are late.
     zoned = guess_time({"column 1": [f"{date[:19]}+02:00" for date in dates], "current_time": seconds})
     coarse = guess_time(
