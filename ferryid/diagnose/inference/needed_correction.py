@@ -29,8 +29,8 @@ def why_too_light(profile: Profile) -> str:
     told = listed([f"{share:.2g} in {axis}" for axis, share in shares.items()])
     return (
         f"The inertia of the profile's hull model is less than its rigid body's ({told}), as no hull's is, so that nothing "
-        "agrees with it. Fix: correct M and D in the profile (`ferryid vessel check`), or leave them out, and the logs bring "
-        "the hull"
+        "agrees with it. Fix: correct M and D in the profile (`ferryid vessel check`), or mass_kg, inertia_z or k_zz_m where "
+        "that is too large, or leave M and D out, and the logs bring the hull"
     )
 
 

@@ -94,3 +94,7 @@ def test_a_campaign_says_that_the_profile_is_too_light() -> None:
     share = 0.3 * hull.M[0, 0] / hull.mass_kg
     assert f"less than its rigid body's ({share:.2g} in surge), as no hull's is" in why_too_light(light)
     assert why_too_light(replace(light, hull=replace(light.hull, spread=np.inf))) == ""
+    # The model may be right, and what it is compared with too large.
+    guessed = why_too_light(replace(FERRY, hull=replace(hull, inertia_z=1.5 * hull.inertia_z)))
+    assert "in yaw" in guessed
+    assert "or mass_kg, inertia_z or k_zz_m where that is too large" in guessed
