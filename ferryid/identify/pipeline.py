@@ -39,6 +39,7 @@ from ferryid.identify.split import Split, TooShort
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.weak_data import WeakData, weak_data
 from ferryid.identify.window_length import with_best_length
+from ferryid.log_warnings import left_out_together
 from ferryid.models import Model, ModelScores
 from ferryid.models.store import check_name
 from ferryid.regression.bases import Basis
@@ -95,7 +96,7 @@ def fit_logs(
         raise type(error)(logs.beside(late)) from error
     return replace(
         outcome,
-        warnings=(*said, *outcome.warnings, *logs.doubts, *logs.left_out),
+        warnings=(*said, *outcome.warnings, *logs.doubts, *left_out_together(logs.left_out)),
         order_responses=responses,
         notes=logs.notes,
         logs_left_out=logs.reasons,
