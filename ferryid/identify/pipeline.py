@@ -45,6 +45,7 @@ from ferryid.models.store import check_name
 from ferryid.regression.bases import Basis
 from ferryid.signals.artificial import NO_RECORDING
 from ferryid.signals.copies import motion_marks
+from ferryid.signals.data_quality import unread
 from ferryid.signals.prepare import Opened
 from ferryid.signals.smooth import smooth_measured
 from ferryid.types import Flags, RunContext
@@ -89,10 +90,11 @@ def fit_logs(
     try:
         outcome = fit_opened(logs.opened, profile, settings, run, name)
     except FerryIdError as error:
-        if not logs.left_out and not said:
+        lost = _lost(logs.opened) if isinstance(error, TooShort) else ()
+        if not logs.left_out and not said and not lost:
             raise
-        # What is followed late may be why.
-        late = type(error)(with_sentence(error, *said))
+        # What is followed late, or what a file has lost, may be why.
+        late = type(error)(with_sentence(error, *said, *lost))
         raise type(error)(logs.beside(late)) from error
     return replace(
         outcome,
@@ -101,6 +103,14 @@ def fit_logs(
         notes=logs.notes,
         logs_left_out=logs.reasons,
     )
+
+
+def _lost(opened: Sequence[Opened]) -> tuple[str, ...]:
+    """Return what a single log has lost of its messages, as a sentence, such as the end of a file that was cut off."""
+    if len(opened) != 1 or not any(loss.costs_messages for loss in opened[0].recording.losses):
+        return ()
+    (sentence,) = unread(opened[0].recording.losses)
+    return (sentence[0].upper() + sentence[1:],)
 
 
 def fit_opened(
