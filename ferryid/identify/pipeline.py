@@ -31,7 +31,7 @@ from ferryid.identify.motion_data import LogData, numbered_names, prepared_data
 from ferryid.identify.order_responses import estimate_order_responses
 from ferryid.identify.outcome import ComponentCurve, EstimatorScore, Excitation, FitOutcome
 from ferryid.identify.own_conditions import with_own_conditions
-from ferryid.identify.physical_checks import law_of, physical_checks
+from ferryid.identify.physical_checks import law_of, light_base, physical_checks
 from ferryid.identify.rows import basis_for
 from ferryid.identify.settings import TEST_WINDOW_S, FitSettings, check_components
 from ferryid.identify.sign_changes import sign_changes
@@ -98,7 +98,7 @@ def fit_logs(
         raise type(error)(logs.beside(late)) from error
     return replace(
         outcome,
-        warnings=(*said, *outcome.warnings, *logs.doubts, *left_out_together(logs.left_out)),
+        warnings=(*light_base(profile), *said, *outcome.warnings, *logs.doubts, *left_out_together(logs.left_out)),
         order_responses=responses,
         notes=logs.notes,
         logs_left_out=logs.reasons,
