@@ -11,6 +11,10 @@ MOST_LOGS_SAID = 10
 """Logs of an archive whose own warnings are repeated for all of it."""
 ALIKE_LOGS = 3
 """Logs of which the same is said with other numbers, from which on it is said once."""
+NAMED_LOGS = 3
+"""Logs that are named where the same is said of more of them."""
+LEFT_OUT = re.compile(r"(?P<whole>Left out of the [\w ]+): (?P<log>[^:]+): (?P<why>.+)", re.DOTALL)
+"""What is said of a log that is left out: of what, which log, and why."""
 NUMBER = re.compile(r"(?<![\w.:,-])\d+(?:,\d{3})*(?:\.\d+)?(?![\w.:-]*\w)")
 PLACE = "\0"
 """A number without a sign that is no part of a name or of a time, and what stands in its place in the shape of a sentence."""
@@ -40,6 +44,31 @@ def log_warnings(told: Sequence[tuple[str, Sequence[str]]]) -> tuple[str, ...]:
     if (others := len(those) - MOST_LOGS_SAID) > 0:
         said.append(f"{counted(others, 'more log')} {verb(others, 'has')} such warnings, see the JSON.")
     return tuple(said)
+
+
+def left_out_together(sentences: Sequence[str]) -> list[str]:
+    """Return sentences in which logs that are left out for one reason are named together, where the first of them stands.
+
+    Reasons are alike that differ by their numbers alone, in `ALIKE_LOGS` logs or more; all other sentences stay as they are.
+    """
+    alike: dict[tuple[str, str], list[tuple[str, str, str]]] = {}
+    for sentence in sentences:
+        if found := LEFT_OUT.fullmatch(sentence):
+            of_shape = alike.setdefault((found["whole"], NUMBER.sub(PLACE, found["why"])), [])
+            of_shape.append((sentence, found["log"], found["why"]))
+    together = dict[str, str]()
+    taken = set[str]()
+    for (whole, shape), logs in alike.items():
+        if len(logs) < ALIKE_LOGS:
+            continue
+        names = ", ".join(name for _, name, _ in logs[:NAMED_LOGS])
+        more = len(logs) - NAMED_LOGS
+        reason = _ranged(shape, [why for _, _, why in logs])
+        together[logs[0][0]] = (
+            f"{whole}: {counted(len(logs), 'log')} ({names}{f' and {more} more' if more else ''}): {reason}"
+        )
+        taken.update(sentence for sentence, _, _ in logs[1:])
+    return [together.get(sentence, sentence) for sentence in sentences if sentence not in taken]
 
 
 def _ranged(shape: str, sentences: Sequence[str]) -> str:

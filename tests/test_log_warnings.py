@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ferryid.log_warnings import log_warnings
+from ferryid.log_warnings import left_out_together, log_warnings
 
 
 def used(seconds: str, first: str, topic: str = "/left_thruster2") -> str:
@@ -42,3 +42,24 @@ def test_intervals_of_several_logs_become_the_one_that_holds_them_all() -> None:
         "3 logs: It went from (1 to 9) to (4 to 6)."
     )
     assert told("Bytes 5 to 9.", "Bytes 5 to 8.", "Bytes 5 to 7.") == "3 logs: Bytes 5 to (7 to 9)."
+
+
+def test_logs_left_out_for_one_reason_are_told_together() -> None:
+    why = "position is needed by the profile, found no topic. Fix: map it"
+    left = [f"Left out of the fit: logs/{name}.bag: {why}" for name in "abcde"]
+    short = [
+        f"Left out of the fit: {name}: too short, found {found} s. Fix: more" for name, found in (("f", 2), ("g", 3))
+    ]
+    told = ["Heed this.", left[0], short[0], *left[1:], short[1]]
+    assert left_out_together(told) == [
+        "Heed this.",
+        f"Left out of the fit: 5 logs (logs/a.bag, logs/b.bag, logs/c.bag and 2 more): {why}",
+        *short,
+    ]
+    third = "Left out of the fit: h: too short, found 1 s. Fix: more"
+    assert left_out_together([*short, third]) == [
+        "Left out of the fit: 3 logs (f, g, h): too short, found 1 to 3 s. Fix: more"
+    ]
+    # Of a campaign and of its references each by itself.
+    other = [one.replace("fit", "references") for one in left[:2]]
+    assert left_out_together([*left[:2], *other]) == [*left[:2], *other]

@@ -29,6 +29,7 @@ from ferryid.compare.tracking import tracking_scores
 from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError
 from ferryid.identify import check_window
+from ferryid.log_warnings import left_out_together
 from ferryid.models import usable_rows
 from ferryid.models.forces import effective_mass, model_estimator
 from ferryid.models.prediction import (
@@ -181,7 +182,7 @@ def compare(
         window_s=window_s,
         prediction_window_s=window_seconds(field.profile),
         models=tuple(_model(one) for one in field.candidates),
-        warnings=(*field.warnings, *notes, *left_out_of("comparison", errors)),
+        warnings=(*field.warnings, *notes, *left_out_together(left_out_of("comparison", errors))),
         logs=tuple(
             LogErrors(
                 name=log.name,

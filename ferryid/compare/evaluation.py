@@ -13,6 +13,7 @@ from ferryid.compare.candidates import trained_on
 from ferryid.compare.thresholds import COMPARE
 from ferryid.errors import FerryIdError
 from ferryid.identify import check_window
+from ferryid.log_warnings import left_out_together
 from ferryid.models import RANGE_UNITS, ForceScores, Model, StoredEffect, force_scores, outside_ranges, usable_rows
 from ferryid.models.forces import Estimator, effective_mass, without_inputs
 from ferryid.models.prediction import Prediction, predict, predict_base, signal_map, window_errors, window_scores
@@ -85,7 +86,7 @@ def evaluate(
     found = list(usable(logs, on, errors))
     windows = [one.windows for one in found]
     beside_hull = [one.beside_hull for one in found if one.beside_hull is not None]
-    left_out = left_out_of("evaluation", errors)
+    left_out = left_out_together(left_out_of("evaluation", errors))
     run.progress("")
     tau, base_all, model_all = (np.concatenate(columns) for columns in zip(*(one.forces for one in found), strict=True))
     return {
@@ -104,7 +105,7 @@ def evaluate(
             "prediction": _prediction_json(windows, model, profile),
             **_beside_hull_json(beside_hull, model, profile),
         },
-        **({"warnings": list(left_out)} if left_out else {}),
+        **({"warnings": left_out} if left_out else {}),
     }
 
 

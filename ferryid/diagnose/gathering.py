@@ -21,6 +21,7 @@ from ferryid.effects.wording import MEANS_LITTLE, listed
 from ferryid.errors import FerryIdError
 from ferryid.files import name_of_log, resolved
 from ferryid.identify.engagement import pooled, unanswered_force, unengaged
+from ferryid.log_warnings import ALIKE_LOGS
 from ferryid.models import Model
 from ferryid.side_by_side import over
 from ferryid.signals.artificial import NO_RECORDING
@@ -149,6 +150,19 @@ def unused(paths: Sequence[str], groups: Sequence[Group]) -> tuple[tuple[str, st
     return tuple(found.items())
 
 
+def _no_recordings(artificial: Mapping[str, str]) -> list[str]:
+    """Return that no log is a recording of a vessel, as sentences: one where several have one reason, by their paths."""
+    reasons = set(artificial.values())
+    if len(reasons) == 1 and len(artificial) >= ALIKE_LOGS:
+        told = [(f"Each of the {len(artificial)} logs", "them", reasons.pop())]
+    else:
+        told = [(path, "it", why) for path, why in artificial.items()]
+    return [
+        f"{which} {NO_RECORDING}: {why}. What is found in {of} belongs to whatever made {of}, and not to a vessel."
+        for which, of, why in told
+    ]
+
+
 def _unanswered(logs: Sequence[AveragedLog], profile: Profile) -> tuple[str, ...]:
     """Return a sentence on logs that are used though the vessel hardly follows the applied force in them.
 
@@ -217,6 +231,24 @@ def with_common_sensors(logs: Sequence[AveragedLog]) -> tuple[AveragedLog, ...]:
     return tuple(over(lambda pair: pair[0] if pair[1] is pair[0].screened else average(pair[1]), pairs))
 
 
+def with_own_sensors(group: Group, unpooled: Mapping[str, AveragedLog]) -> Group:
+    """Return a group with what its own logs show of its sensors, where others took part in what was common to all.
+
+    Parameters
+    ----------
+    group
+        Logs of one hull, of all that were given or of a part of them.
+    unpooled
+        All that were given, as each is by itself, by their paths.
+    """
+    mine = [*group.logs, *group.references]
+    if len(mine) == len(unpooled):
+        return group
+    again = with_common_sensors([unpooled[one.path] for one in mine])
+    count = len(group.logs)
+    return replace(group, logs=tuple(again[:count]), references=tuple(again[count:]))
+
+
 def sort_out(logs: Sequence[AveragedLog], whose: str) -> tuple[list[AveragedLog], list[str]]:
     """Return logs without simulated ones and ones that contradict themselves, where others do not, and a sentence on each.
 
@@ -224,10 +256,7 @@ def sort_out(logs: Sequence[AveragedLog], whose: str) -> tuple[list[AveragedLog]
     """
     artificial = {one.path: why for one in logs if (why := _simulated(one))}
     if artificial and len(artificial) == len(logs):
-        return list(logs), [
-            f"{path} {NO_RECORDING}: {why}. What is found in it belongs to whatever made it, and not to a vessel."
-            for path, why in artificial.items()
-        ]
+        return list(logs), _no_recordings(artificial)
     notes = [
         f"Left out of the {whose}: {path}: it is simulated among recorded logs, {why}. Fix: diagnose simulated logs by "
         "themselves"

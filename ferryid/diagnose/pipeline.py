@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -16,6 +16,7 @@ from ferryid.diagnose.gathering import (
     part,
     unused,
     with_common_sensors,
+    with_own_sensors,
     without_logs,
 )
 from ferryid.diagnose.inference.baselines import CampaignBaseline, HullBaseline, SimulationBaseline
@@ -163,18 +164,30 @@ def _groups(
         simulated = Group(gathered.logs, notes=gathered.notes, copies=gathered.copies)
         return (_judged_group(simulated, profile, settings, run),)
     run.progress("comparing the sensors of the logs")
+    unpooled = {one.path: one for one in (*gathered.logs, *references.logs)}
     screened = with_common_sensors([*gathered.logs, *references.logs])
     gathered, references = (
         replace(one, logs=some)
         for one, some in ((gathered, screened[: len(gathered.logs)]), (references, screened[len(gathered.logs) :]))
     )
     run.progress("comparing the hulls of the logs")
-    found = [_judged_group(one, profile, settings, run) for one in part(gathered, references, profile, settings.model)]
+    found = _judged_groups(part(gathered, references, profile, settings.model), unpooled, profile, settings, run)
     if any(one.unconfirmed for one in found):
         # Without what changed in it, a log has no hull in common with the others.
         groups = part(gathered, references, profile, settings.model, beside_change=False)
-        found = [_judged_group(one, profile, settings, run) for one in groups]
-    return tuple(found)
+        found = _judged_groups(groups, unpooled, profile, settings, run)
+    return found
+
+
+def _judged_groups(
+    groups: Sequence[Group],
+    unpooled: Mapping[str, AveragedLog],
+    profile: Profile,
+    settings: DiagnosisSettings,
+    run: RunContext,
+) -> tuple[JudgedGroup, ...]:
+    # Another vessel's sensors are not these.
+    return tuple(_judged_group(with_own_sensors(one, unpooled), profile, settings, run) for one in groups)
 
 
 @dataclass(frozen=True)

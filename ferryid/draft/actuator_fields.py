@@ -268,9 +268,9 @@ def shared_topics(topics: Sequence[Topic]) -> list[SharedTopic]:
 
 
 def constant(shared: SharedTopic, samples: Samples) -> bool:
-    """Tell whether what a topic carries of several actuators is one and the same value."""
-    known = (shared.topic, shared.value) in samples.columns
-    return known and np.unique(samples.raw(shared.topic, shared.value)).size == 1
+    """Tell whether what a topic carries of several actuators never changes of any of them."""
+    known = all((shared.topic, path) in samples.columns for path in (*shared.selectors, shared.value))
+    return known and not parted(shared, samples)[0]
 
 
 def parted(shared: SharedTopic, samples: Samples) -> tuple[list[ActuatorField], Samples]:

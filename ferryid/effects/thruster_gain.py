@@ -100,7 +100,9 @@ def _multiplied(force_model: ForceModel, factor: Floats, k: int) -> ForceModel:
 def says(values: Values, instance: str | None) -> str:
     """Return the finding as a sentence."""
     compared = "of its thrust curve" if "otherwise" not in values else "that it gives at other times"
-    return f"{instance} gives {100.0 * values['factor']:.0f} % of the force {compared}."
+    # A factor that is not zero is no "0 %".
+    share = "less than 1 %" if 0.0 < values["factor"] < 0.005 else f"{100.0 * values['factor']:.0f} %"
+    return f"{instance} gives {share} of the force {compared}."
 
 
 def scenario(values: Values, instance: str | None) -> dict[str, Any]:

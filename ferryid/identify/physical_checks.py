@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ferryid.effects.wording import listed
 from ferryid.identify.acceptance import Check
 from ferryid.identify.fit_data import Coefficients, FitData
 from ferryid.identify.inertia import largest_inertia, relative_inertia, rigid_body, scaled_eigenvalue
@@ -20,6 +21,22 @@ _ALONE = ("u", "v", "r")
 _UNITS = ("kg", "kg", "kg·m²")
 _ROUNDING = 1e-3
 """Part of a bound within which an inertia is at it."""
+
+
+def light_base(profile: Profile) -> tuple[str, ...]:
+    """Return that the hull model of a profile has less inertia than its rigid body, as a sentence; empty where it has not."""
+    if not profile.hull.is_known:
+        return ()
+    checks = {one.name: one for one in inertia_checks(profile, np.asarray(profile.hull.M))}
+    found = {axis: checks[f"inertia_{axis}"] for axis in AXES}
+    light = [f"{one.value:.2g} in {axis}" for axis, one in found.items() if one.value < one.limit and not one.passed]
+    if not light:
+        return ()
+    return (
+        f"The inertia of the profile's hull model is less than its rigid body's ({listed(light)}), as no hull's is, and the "
+        "fit starts from it. Fix: correct [hull.M] in the profile, which is rigid body and added mass together "
+        "(`ferryid vessel check`).",
+    )
 
 
 def inertia_checks(profile: Profile, mass: Floats, spans: Floats | None = None) -> tuple[Check, ...]:

@@ -31,7 +31,7 @@ from ferryid.identify.motion_data import LogData, numbered_names, prepared_data
 from ferryid.identify.order_responses import estimate_order_responses
 from ferryid.identify.outcome import ComponentCurve, EstimatorScore, Excitation, FitOutcome
 from ferryid.identify.own_conditions import with_own_conditions
-from ferryid.identify.physical_checks import law_of, physical_checks
+from ferryid.identify.physical_checks import law_of, light_base, physical_checks
 from ferryid.identify.rows import basis_for
 from ferryid.identify.settings import TEST_WINDOW_S, FitSettings, check_components
 from ferryid.identify.sign_changes import sign_changes
@@ -39,11 +39,13 @@ from ferryid.identify.split import Split, TooShort
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.weak_data import WeakData, weak_data
 from ferryid.identify.window_length import with_best_length
+from ferryid.log_warnings import left_out_together
 from ferryid.models import Model, ModelScores
 from ferryid.models.store import check_name
 from ferryid.regression.bases import Basis
 from ferryid.signals.artificial import NO_RECORDING
 from ferryid.signals.copies import motion_marks
+from ferryid.signals.data_quality import unread
 from ferryid.signals.prepare import Opened
 from ferryid.signals.smooth import smooth_measured
 from ferryid.types import Flags, RunContext
@@ -88,18 +90,27 @@ def fit_logs(
     try:
         outcome = fit_opened(logs.opened, profile, settings, run, name)
     except FerryIdError as error:
-        if not logs.left_out and not said:
+        lost = _lost(logs.opened) if isinstance(error, TooShort) else ()
+        if not logs.left_out and not said and not lost:
             raise
-        # What is followed late may be why.
-        late = type(error)(with_sentence(error, *said))
+        # What is followed late, or what a file has lost, may be why.
+        late = type(error)(with_sentence(error, *said, *lost))
         raise type(error)(logs.beside(late)) from error
     return replace(
         outcome,
-        warnings=(*said, *outcome.warnings, *logs.doubts, *logs.left_out),
+        warnings=(*light_base(profile), *said, *outcome.warnings, *logs.doubts, *left_out_together(logs.left_out)),
         order_responses=responses,
         notes=logs.notes,
         logs_left_out=logs.reasons,
     )
+
+
+def _lost(opened: Sequence[Opened]) -> tuple[str, ...]:
+    """Return what a single log has lost of its messages, as a sentence, such as the end of a file that was cut off."""
+    if len(opened) != 1 or not any(loss.costs_messages for loss in opened[0].recording.losses):
+        return ()
+    (sentence,) = unread(opened[0].recording.losses)
+    return (sentence[0].upper() + sentence[1:],)
 
 
 def fit_opened(

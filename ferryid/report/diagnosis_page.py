@@ -12,7 +12,7 @@ import numpy as np
 from ferryid.counts import counted
 from ferryid.diagnose import Diagnosis, Finding, Withheld, campaign_verdict
 from ferryid.effects.wording import MEANS_LITTLE
-from ferryid.log_warnings import log_warnings
+from ferryid.log_warnings import left_out_together, log_warnings
 from ferryid.models.prediction import FreeRun
 from ferryid.report import (
     campaign,
@@ -82,7 +82,7 @@ def render(
         made=made,
         gathered=gathered,
         foremost=foremost,
-        shared_notes=[note for note in shared if note not in (*gathered, *foremost)],
+        shared_notes=left_out_together([note for note in shared if note not in (*gathered, *foremost)]),
         shared_sources=second_sources.section(together) if together else {},
         shared_model=diagnosis_words.model_of_all(diagnoses),
         axes=list(zip(AXES, UNITS, strict=True)),
@@ -124,7 +124,7 @@ def _several_as_text(diagnoses: Sequence[Diagnosis]) -> str:
         blocks.append("\n".join(_folded(line) for line in lines))
     blocks += campaign.text_tables(diagnoses)
     about_all = [
-        *(note for note in shared if note not in first),
+        *left_out_together([note for note in shared if note not in first]),
         *likeness.notes(diagnoses[0].likeness_of_all, "these logs together"),
     ]
     if about_all:

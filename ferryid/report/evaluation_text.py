@@ -130,12 +130,15 @@ def _verdict(entry: dict[str, Any], error: str, base: str = "its base model") ->
     better = mean < 1.0
     # Hardly any error is left, but some.
     digits = 1 if 0.0 < mean < 0.005 else 0
-    told = f"{100.0 * abs(mean - 1.0):.{digits}f} % {'better' if better else 'worse'} than {base} here ({error})"
+    size = f"{100.0 * abs(mean - 1.0):.{digits}f} %"
+    # No percentage of a change is one: "0 % worse" names a side that the figure does not have.
+    change = "as good as" if size == "0 %" else f"{size} {'better' if better else 'worse'} than"
+    told = f"{change} {base} here ({error})"
     if not worse:
         return told
     if len(worse) == len(AXES):
         return f"{told}, on every axis"
-    return f"{told}, {'but worse' if better else 'namely'} in {' and '.join(worse)}"
+    return f"{told}, {'namely' if mean >= 1.0 and size != '0 %' else 'but worse'} in {' and '.join(worse)}"
 
 
 def _free_run_lines(runs: dict[str, Any]) -> list[str]:

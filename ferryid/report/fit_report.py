@@ -17,7 +17,7 @@ from ferryid.models.store import StoredModel, assign_version, plan, save
 from ferryid.report.folder import PAGE, write_folder
 from ferryid.report.headline import headline_of
 from ferryid.report.interactive import write_assets
-from ferryid.report.model_text import describe_settings
+from ferryid.report.model_text import describe_settings, error_ratio
 from ferryid.report.outcome import Report
 from ferryid.report.page_process import PageProcess, started
 from ferryid.types import AXES, RunContext
@@ -215,13 +215,14 @@ def as_text(result: FitOutcome, stored: StoredModel, report: Path | None) -> str
         lines.append(JUDGED)
     lines.append("")
     for one in result.estimators:
+        held_out = error_ratio(one.held_out) if np.isfinite(one.held_out) else "–"
         folds = (
-            f"{_number(one.folds)} on folds of the training rows"
+            f"{error_ratio(one.folds)} on folds of the training rows"
             if np.isfinite(one.folds)
             else "unknown on folds of the training rows, which are too short for it"
         )
         lines.append(
-            f"estimator {one.name}: squared prediction error over the base model's: {folds}, {_number(one.held_out)} held out"
+            f"estimator {one.name}: squared prediction error over the base model's: {folds}, {held_out} held out"
             f"{'' if one.possible else '; no hull has such inertia or damping'}{'; chosen' if one.chosen else ''}"
         )
     lines.extend(f"wind, estimated: {one}" for one in result.winds)

@@ -162,5 +162,10 @@ def _verdict(model: Model) -> str:
     return "diagnosed" if model.diagnosed else "REJECTED"
 
 
+def error_ratio(value: float) -> str:
+    """Return a squared error over another with three decimals, a huge one, as over hardly any error, by its power of ten."""
+    return f"{value:.3f}" if value < 1000.0 else f"{value:.1e}"
+
+
 def _number(value: float | None) -> str:
     return "-" if value is None or not math.isfinite(value) else f"{value:.3f}"

@@ -21,6 +21,7 @@ from ferryid.report.headline import headline_of
 from ferryid.report.html import template, with_contents
 from ferryid.report.interactive import STATIC, Interactive, interactive_of
 from ferryid.report.left_out import left_out_table
+from ferryid.report.model_text import error_ratio
 from ferryid.report.next_steps import after_fit
 from ferryid.report.structure import remainder, worst_and_best_minute
 from ferryid.types import AXES, NOTHING, Floats, Given
@@ -133,8 +134,8 @@ def _context(result: FitOutcome, interactive: Interactive, drawings: Drawings) -
                 "name": one.name
                 + (", used" if one.chosen else "")
                 + ("" if one.possible else ", with inertia or damping that no hull has"),
-                "folds": f"{one.folds:.3f}" if isfinite(one.folds) else "unknown, too short for it",
-                "held_out": f"{one.held_out:.3f}" if isfinite(one.held_out) else "–",
+                "folds": error_ratio(one.folds) if isfinite(one.folds) else "unknown, too short for it",
+                "held_out": error_ratio(one.held_out) if isfinite(one.held_out) else "–",
             }
             for one in result.estimators
         ],

@@ -112,7 +112,7 @@ def left_out_sentences(recording: Recording, left_out: Sequence[LeftOut], used: 
     `used` are flags of the rows that are, shape (n,).
     """
     said = [note for note in recording.notes if note.startswith(USED)]
-    said += _unread(recording.losses)
+    said += unread(recording.losses)
     said += grouped_notes({topic: _of_clock(stream) for topic, stream in recording.streams.items()})
     said += rows_left_out(left_out, max(used.size, _rows(left_out) + int(np.count_nonzero(used))))
     return tuple(said)
@@ -176,10 +176,12 @@ class LostData(Record):
         )
 
 
-def _unread(losses: Sequence[Loss]) -> tuple[str, ...]:
+def unread(losses: Sequence[Loss]) -> tuple[str, ...]:
     """Return in one sentence what could not be read in all, and the largest or least certain part of it."""
     if not losses:
         return ()
+    # What was repaired is counted where nothing else was wrong: it is a remark, and no loss.
+    losses = [loss for loss in losses if loss.costs_messages] or losses
     count, unknown = sum(loss.messages or 0 for loss in losses), any(loss.messages is None for loss in losses)
     if count:
         what = f"{counted(count, 'message')} could not be read" + (", and perhaps more" if unknown else "")
@@ -191,8 +193,16 @@ def _unread(losses: Sequence[Loss]) -> tuple[str, ...]:
 
 
 def main_loss(losses: Sequence[Loss]) -> Loss:
-    """Return the largest of the losses, or the least certain where none is known to have cost a message."""
-    return max(losses, key=lambda loss: (loss.messages or 0, loss.messages is None))
+    """Return the largest of the losses, or the least certain where none is known to have cost a message.
+
+    Of several that are uncertain, all that is behind a time is more than a stretch that ends.
+    """
+
+    def size(loss: Loss) -> tuple[int, bool, bool, float]:
+        endless = loss.start_ns is not None and loss.end_ns is None
+        return loss.messages or 0, loss.messages is None, endless, loss.seconds or 0.0
+
+    return max(losses, key=size)
 
 
 _DROPPED = (

@@ -57,6 +57,11 @@ HEAD = {"model": {"name": "ferry", "version": 1}, "window_s": 2.0}
         ((1.2, 1.3, 1.4), "30 % worse than its base model here (mean square force error, row by row), on every axis"),
         # Within 5 % no axis is called worse.
         ((1.04, 1.04, 1.04), "4 % worse than its base model here (mean square force error, row by row)"),
+        # "0 % worse" would name a side that the figure does not have.
+        (
+            (1.4, 0.5, 1.106),
+            "as good as its base model here (mean square force error, row by row), but worse in surge and yaw",
+        ),
         # An axis on which the base model is right cannot be judged.
         (
             (np.nan, 1.2, 1.4),

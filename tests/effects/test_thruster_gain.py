@@ -112,3 +112,10 @@ def test_a_factor_by_level_is_a_power_of_the_thrust_over_its_usual_size() -> Non
     ruddered = {"F_propeller": np.linspace(5.0, 40.0, N), "delta_propeller": np.linspace(-0.5, 0.5, N)}
     same = by_level.apply(of(measured(TANKER, ruddered)), np.array([0.6, 0.0]), "propeller").parts
     np.testing.assert_allclose(same, weak(measured(TANKER, ruddered), 0.6, "propeller"))
+
+
+def test_a_factor_that_is_not_zero_is_not_said_to_be() -> None:
+    gain = effects()["thruster_gain"]
+    assert gain.says({"factor": 0.001}, "port") == "port gives less than 1 % of the force of its thrust curve."
+    assert gain.says({"factor": 0.0}, "port") == "port gives 0 % of the force of its thrust curve."
+    assert gain.says({"factor": 0.6}, "port") == "port gives 60 % of the force of its thrust curve."

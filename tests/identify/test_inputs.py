@@ -17,6 +17,7 @@ from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.sweeps.settings_sweep import sweep_settings
 from ferryid.identify.sweeps.structure_sweep import sweep_structures
+from ferryid.ingest.log import Loss
 from ferryid.signals.copies import GivenLogs
 from ferryid.signals.prepare import Opened, open_track
 from ferryid.signals.smooth import Measured
@@ -154,6 +155,23 @@ def test_too_little_that_is_left_is_refused_with_what_was_left_out(given: Given)
         r"So is 1 more log\. Fix: give a longer log",
     ):
         fit_logs(paths, PROFILE, QUICK, NOWHERE)
+
+
+def test_a_log_that_was_cut_off_and_is_too_short_for_it_says_so(given: Given, monkeypatch: pytest.MonkeyPatch) -> None:
+    (path,) = given({"one": measured(1, seconds=20.0)})
+    read = inputs.open_track
+
+    def cut_off(log: str, *others: Any, **more: Any) -> Opened:
+        found = read(log, *others, **more)
+        lost = Loss("one.bag", "the file ends at byte 9 of more than 18: about 50 % is lost at the end", start_ns=5)
+        return replace(found, recording=replace(found.recording, losses=(lost,)))
+
+    monkeypatch.setattr(inputs, "open_track", cut_off)
+    with pytest.raises(
+        FerryIdError,
+        match=r"^one: too short .* are needed\. Messages may be lost: one\.bag: the file ends at byte 9 .* Fix: give a longer",
+    ):
+        fit_logs([path], PROFILE, QUICK, NOWHERE)
 
 
 def test_a_log_whose_actuators_were_not_engaged_is_left_out(given: Given) -> None:

@@ -139,6 +139,11 @@ def test_an_estimator_without_a_model_on_the_folds_is_said_to_be_without_one(
         in told
     )
     assert "model's: 0.063 on folds of the training rows, 0.212 held out; chosen" in told
+    # Beside a base model that errs by hardly anything on the folds.
+    huge = replace(result, estimators=(EstimatorScore("weak", 560286861189.98, 2.486, True),))
+    told = as_text(huge, StoredModel(tmp_path / "1.json", huge.model, current=False), None)
+    assert "model's: 5.6e+11 on folds of the training rows, 2.486 held out; chosen" in told
+    assert "<td>weak, used</td><td>5.6e+11</td><td>2.486</td>" in render(huge)[0]
 
 
 def test_conditions_of_single_logs_stand_on_the_page_in_the_text_and_in_the_json(

@@ -17,7 +17,7 @@ import pytest
 
 from ferryid.errors import FerryIdError
 from ferryid.ingest.log import Loss
-from ferryid.signals.data_quality import loss_sentence, remarks
+from ferryid.signals.data_quality import loss_sentence, main_loss, remarks, unread
 from ferryid.signals.inspect import inspect, render_inspect
 from ferryid.signals.prepare import open_track
 from ferryid.signals.recording import record
@@ -326,3 +326,14 @@ def test_rows_left_out_for_their_times_stand_beside_what_is_lost(tmp_path: Path)
     assert "Lost: nothing" not in said
     assert "Lost: no message; 4 rows are left out for wrong times: 4 as they repeat the time of another." in said
     assert "4 rows repeat the time of another and were left out" in said
+
+
+def test_the_most_that_was_lost_is_told_first_and_what_was_repaired_is_no_loss() -> None:
+    repaired = Loss("a.bag", "the index cannot be used", None, 0)
+    chunk = Loss("a.bag", "the file ends in a chunk")
+    rest = Loss("a.bag", "about half is lost at the end", start_ns=7)
+    assert main_loss([repaired, chunk, rest]) is rest
+    assert unread([repaired, chunk, rest]) == (
+        "messages may be lost: a.bag: about half is lost at the end; and 1 more loss, see ferryid inspect.",
+    )
+    assert unread([repaired]) == ("no message is known to be lost: a.bag: the index cannot be used.",)

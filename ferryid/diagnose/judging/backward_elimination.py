@@ -110,12 +110,12 @@ def eliminate_backward(
             standings = standings or _standings(problem, kept, library)
             # What fell may have been right: it is no rival of what is likely beside it.
             standings = tuple(without_companions(problem, kept, i, one) for i, one in enumerate(standings))
-            return Elimination(kept, proof, standings, _told(fallen_by_reason))
+            return Elimination(kept, proof, standings, _told(fallen_by_reason, kept))
         if why:
             fallen_by_reason.setdefault(why, []).append(kept.candidates[fallen].title)
         kept = prune(problem, without(problem, kept, fallen))
         tried.add(kept.keys)
-    return Elimination(kept, None, (), _told(fallen_by_reason))
+    return Elimination(kept, None, (), _told(fallen_by_reason, kept))
 
 
 def _spans(made: Fit) -> frozenset[tuple[object, ...]]:
@@ -130,11 +130,17 @@ def _standings(problem: EstimationProblem, kept: Fit, library: Sequence[Candidat
     )
 
 
-def _told(fallen_by_reason: Mapping[str, Sequence[str]]) -> tuple[str, ...]:
-    """Return a sentence for every reason; what is dropped twice for it, on the way, is named once."""
+def _told(fallen_by_reason: Mapping[str, Sequence[str]], kept: Fit) -> tuple[str, ...]:
+    """Return a sentence for every reason; what is dropped twice for it, on the way, is named once.
+
+    What fell and came back in the place of another stands, and is not called dropped.
+    """
+    stand = {one.title for one in kept.candidates}
     said = []
     for why, titles in fallen_by_reason.items():
-        names = list(dict.fromkeys(titles))
+        names = [title for title in dict.fromkeys(titles) if title not in stand]
+        if not names:
+            continue
         said.append(f"{listed(names)} {'were' if len(names) > 1 else 'was'} considered, but dropped: {why}.")
     return tuple(said)
 

@@ -17,6 +17,7 @@ from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.effect import Effect, Parameter
 from ferryid.effects.force_model import COEFFICIENTS, UNITS, ForceModel
+from ferryid.effects.wording import listed
 from ferryid.identify import inertia_checks
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
@@ -143,9 +144,9 @@ def impossible_throughout(profile: Profile, hull: Floats) -> tuple[str, ...]:
     shares = [one for one in inertia_checks(profile, mass_of(hull)) if one.name.startswith("inertia")]
     if any(one.passed for one in shares):
         return ()
-    listed = ", ".join(f"{one.value:.2g}" for one in shares)
+    each = ", ".join(f"{one.value:.2g}" for one in shares)
     return (
-        f"The effective inertia in surge, sway and yaw is {listed} times the rigid body's, which no hull has: places, "
+        f"The effective inertia in surge, sway and yaw is {each} times the rigid body's, which no hull has: places, "
         "directions or thrust curves of the actuators, or the unit of their signals, are not those of the vessel.",
     )
 
@@ -225,7 +226,13 @@ def interval_doubt(
         spread = np.sqrt(np.diag(covariance)[sized])
         alike = _given(covariance, sized, confined) / np.outer(spread, spread)
         none = float(away @ np.linalg.solve(alike, away)) <= float(chdtri(len(sized), 0.05))
-    return "its 95 % interval includes no effect at all" if none else ""
+    if not none or all(inside):
+        return "its 95 % interval includes no effect at all" if none else ""
+    # The intervals that are shown exclude it.
+    if len(sized) > 1:
+        names = listed([parameters[k].name.replace("_", " ") for k in sized])
+        return f"the common 95 % region of {names} includes no effect at all"
+    return "its 95 % interval is so uneven that, by its wider side, it includes no effect at all"
 
 
 def size_deviations(parameters: Sequence[Parameter], estimates: Mapping[str, Estimate]) -> float:

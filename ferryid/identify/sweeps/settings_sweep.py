@@ -21,7 +21,7 @@ from ferryid.identify.settings import FOLDS, TEST_WINDOW_S, WINDOWS_S, FitSettin
 from ferryid.identify.split import TooShort
 from ferryid.identify.sweeps.swept import Swept, beats_base
 from ferryid.identify.sweeps.weak_sweep import sweep_weak
-from ferryid.log_warnings import log_warnings
+from ferryid.log_warnings import left_out_together, log_warnings
 from ferryid.regression.bases import Basis
 from ferryid.regression.cross_validation import Folds
 from ferryid.signals.prepare import Opened
@@ -164,7 +164,7 @@ def sweep_settings(
             found = _sweep_derivative(request.of("derivative"))
     else:
         found = _sweep_derivative(request.of("derivative"))
-    notes = (*found.notes, *given.notes, *given.left_out)
+    notes = (*found.notes, *given.notes, *left_out_together(given.left_out))
     return replace(found, notes=notes, asked=asked, estimator_says=says, estimators=scores)
 
 

@@ -26,7 +26,7 @@ from ferryid.identify.sweeps.settings_sweep import as_a_fit, check_folds, deriva
 from ferryid.identify.sweeps.structure_comparison import StructureComparison, StructureSweep
 from ferryid.identify.sweeps.structure_ranking import StructureErrors, rank_structures
 from ferryid.identify.sweeps.weak_structures import compare_weak
-from ferryid.log_warnings import log_warnings
+from ferryid.log_warnings import left_out_together, log_warnings
 from ferryid.models.forces import compute_residual
 from ferryid.regression import REGRESSION, CrossProducts, fit_simpls, total
 from ferryid.regression.bases import STRUCTURES, Basis, basis_names, with_hull_length
@@ -109,7 +109,7 @@ def sweep_structures(
             *_notes(by, settings),
             *log_warnings([(log["name"], log["warnings"]) for log in told]),
             *given.notes,
-            *given.left_out,
+            *left_out_together(given.left_out),
         ),
         settings=settings,
         asked=asked,

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -163,10 +165,17 @@ def test_a_correction_that_is_needed_does_not_fall_for_harm(
 
 
 def test_what_fell_for_one_reason_is_one_sentence() -> None:
-    assert _told({LAW: ["Wind", "Current", "Wind"], PLACEBO: ["Payload"]}) == (
+    fallen = {LAW: ["Wind", "Current", "Wind"], PLACEBO: ["Payload"]}
+
+    def kept(*titles: str) -> Any:
+        return SimpleNamespace(candidates=[SimpleNamespace(title=one) for one in titles])
+
+    assert _told(fallen, kept("Mooring")) == (
         f"Wind and Current were considered, but dropped: {LAW}.",
         f"Payload was considered, but dropped: {PLACEBO}.",
     )
+    # What came back stands among the findings.
+    assert _told(fallen, kept("Current", "Payload")) == (f"Wind was considered, but dropped: {LAW}.",)
 
 
 def test_what_is_too_small_to_matter_falls_without_a_word(problem: EstimationProblem) -> None:

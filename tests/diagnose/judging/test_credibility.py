@@ -346,7 +346,9 @@ def test_a_wind_that_is_known_along_one_direction_alone_is_not_none() -> None:
     # A common region is wider than the interval of each: 2.2 standard deviations to the north and nothing to the east.
     ends = intervals(north=(0.1, 1.9), east=(-1.0, 1.0))
     assert interval_doubt(wind, ends) == ""
-    assert interval_doubt(wind, ends, np.eye(len(wind))) == NONE
+    # The interval to the north excludes none, and the sentence must not contradict it.
+    common = "the common 95 % region of north and east includes no effect at all"
+    assert interval_doubt(wind, ends, np.eye(len(wind))) == common
     assert interval_doubt(wind, intervals(north=(0.4, 1.6), east=(-1.0, 1.0)), np.eye(len(wind))) == ""
 
 
@@ -360,6 +362,11 @@ def test_a_load_whose_place_is_confined_to_the_hull_is_not_none_where_its_moment
     assert interval_doubt(load, ends, covariance) == NONE
     covariance[0, 1] = covariance[1, 0] = -0.95 * 250.0 * 0.46
     assert interval_doubt(load, ends, covariance) == ""
+    # The interval that is shown excludes no load; its wider side, which tells the error, does not.
+    uneven = {"mass": Estimate(24.0, 19.0, 851.0, "kg"), "x": Estimate(0.8, 0.0, 1.1, "m")}
+    assert interval_doubt(load, uneven, np.diag([400.0**2, 0.3**2, *[0.0] * (len(load) - 2)])) == (
+        "its 95 % interval is so uneven that, by its wider side, it includes no effect at all"
+    )
     # A line may lead to anywhere: what pulls alike everywhere is no line.
     line = effects()["mooring"].parameters_of(FERRY)
     ends = intervals(stiffness_north=(-0.1, 0.3), stiffness_east=(-0.1, 0.3), north=(-90.0, 30.0), east=(-90.0, 30.0))
