@@ -154,7 +154,7 @@ def _no_recordings(artificial: Mapping[str, str]) -> list[str]:
     """Return that no log is a recording of a vessel, as sentences: one where several have one reason, by their paths."""
     reasons = set(artificial.values())
     if len(reasons) == 1 and len(artificial) >= ALIKE_LOGS:
-        told = [(f"Each of the {len(artificial)} logs", "them", reasons.pop())]
+        told = [(f"Each of the {counted(len(artificial), 'log')}", "them", reasons.pop())]
     else:
         told = [(path, "it", why) for path, why in artificial.items()]
     return [
