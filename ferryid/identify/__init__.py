@@ -5,7 +5,6 @@ from ferryid.identify.archive import fit_archive, keep_for_archive
 from ferryid.identify.inputs import read_logs
 from ferryid.identify.model_selection import Selection
 from ferryid.identify.outcome import ComponentCurve, Excitation, FitOutcome, LogFit
-from ferryid.identify.physical_checks import inertia_checks
 from ferryid.identify.pipeline import fit_logs, fit_opened
 from ferryid.identify.remainder import fit_remainder, prediction_errors, with_remainder
 from ferryid.identify.settings import FOLDS, FitSettings, check_window, parse_window, parse_windows
@@ -27,7 +26,6 @@ __all__ = [
     "fit_opened",
     "fit_remainder",
     "force_mse",
-    "inertia_checks",
     "keep_for_archive",
     "parse_window",
     "parse_windows",

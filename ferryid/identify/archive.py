@@ -21,7 +21,7 @@ from ferryid.identify.estimation import estimate_correction
 from ferryid.identify.excitation import SECTORS, sector_coverage
 from ferryid.identify.fit_data import Coefficients, Estimate, FitData
 from ferryid.identify.fit_warnings import general_warnings, unused_window
-from ferryid.identify.inertia import axes_without_force
+from ferryid.identify.inertia.shares import axes_without_force
 from ferryid.identify.log_sums import pooled_deviation, pooled_mean_square
 from ferryid.identify.model_selection import select_model
 from ferryid.identify.outcome import ArchivedLog, Excitation, FitOutcome, LogFit

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ferryid.identify.fit_data import Coefficients, Estimate, FitData
-from ferryid.identify.inertia import held_inertia_reason, implausible_inertia, without_inertia
+from ferryid.identify.inertia.shares import held_inertia_reason, implausible_inertia, without_inertia
 from ferryid.models.forces import effective_mass
 from ferryid.regression import Simpls, fit_simpls
 from ferryid.regression.bases import Basis
@@ -20,7 +20,7 @@ def estimate_correction(data: FitData, components: int, draws: int, progress: Ca
     """Estimate the correction with a number of components, and with `draws` its spread.
 
     Where no actuator acts on an axis, or the inertia there cannot be right, the base model's inertia is held; see
-    `ferryid.identify.inertia`.
+    `ferryid.identify.inertia.shares`.
 
     Parameters
     ----------

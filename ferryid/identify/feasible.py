@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ferryid.identify.inertia import rigid_body
+from ferryid.identify.inertia.shares import rigid_body
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.weak_rows import to_force
 from ferryid.models.forces import ACCELERATIONS, effective_mass, motion_force, without_sway_coupling

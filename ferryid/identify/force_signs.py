@@ -12,7 +12,7 @@ import numpy as np
 
 from ferryid.errors import ReversedForcesError
 from ferryid.identify.contradictions import signs_of, unanswered, wrong_way
-from ferryid.identify.inertia import relative_inertia, without_inertia
+from ferryid.identify.inertia.shares import relative_inertia, without_inertia
 from ferryid.identify.motion_data import LogData
 from ferryid.identify.split import Split
 from ferryid.identify.thresholds import IDENTIFY

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ferryid.identify.inertia import axes_without_force
+from ferryid.identify.inertia.shares import axes_without_force
 from ferryid.identify.rows import known_rows, rows_of
 from ferryid.identify.settings import FOLDS, TEST_WINDOW_S, FitSettings
 from ferryid.identify.split import purge_seconds

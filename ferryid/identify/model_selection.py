@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ferryid.counts import counted
-from ferryid.identify.inertia import implausible_inertia, without_inertia
+from ferryid.identify.inertia.shares import implausible_inertia, without_inertia
 from ferryid.identify.settings import WINDOWS_S, FitSettings, check_window
 from ferryid.identify.split import block_number, purge_seconds
 from ferryid.identify.thresholds import IDENTIFY

@@ -14,7 +14,7 @@ from ferryid.identify.contradictions import faint_force
 from ferryid.identify.excitation import assess_excitation, still_axes, still_warnings
 from ferryid.identify.fit_data import Coefficients, Estimate, FitData
 from ferryid.identify.fit_warnings import fit_warnings
-from ferryid.identify.inertia import axes_without_force
+from ferryid.identify.inertia.shares import axes_without_force
 from ferryid.identify.judged_split import judged_by_force
 from ferryid.identify.outcome import Excitation, LogFit
 from ferryid.identify.prediction_windows import PredictionWindows

@@ -23,6 +23,7 @@ from ferryid.identify.fit_warnings import free_run_warnings, rest_warnings, unus
 from ferryid.identify.force_signs import refuse_reversed_forces
 from ferryid.identify.free_run_checks import free_run_checks
 from ferryid.identify.held_out_checks import held_out_checks, skill_checks
+from ferryid.identify.inertia import why_too_light
 from ferryid.identify.inputs import OddLogs, usable_logs
 from ferryid.identify.judged_split import judged_split
 from ferryid.identify.log_sums import folds_by_blocks, force_free_axes, sum_log
@@ -31,7 +32,7 @@ from ferryid.identify.motion_data import LogData, numbered_names, prepared_data
 from ferryid.identify.order_responses import estimate_order_responses
 from ferryid.identify.outcome import ComponentCurve, EstimatorScore, Excitation, FitOutcome
 from ferryid.identify.own_conditions import with_own_conditions
-from ferryid.identify.physical_checks import law_of, light_base, physical_checks
+from ferryid.identify.physical_checks import law_of, physical_checks
 from ferryid.identify.rows import basis_for
 from ferryid.identify.settings import TEST_WINDOW_S, FitSettings, check_components
 from ferryid.identify.sign_changes import sign_changes
@@ -98,11 +99,18 @@ def fit_logs(
         raise type(error)(logs.beside(late)) from error
     return replace(
         outcome,
-        warnings=(*light_base(profile), *said, *outcome.warnings, *logs.doubts, *left_out_together(logs.left_out)),
+        warnings=(*_of_light_base(profile), *said, *outcome.warnings, *logs.doubts, *left_out_together(logs.left_out)),
         order_responses=responses,
         notes=logs.notes,
         logs_left_out=logs.reasons,
     )
+
+
+def _of_light_base(profile: Profile) -> tuple[str, ...]:
+    """Return that the fit starts from a hull model that no hull has, as a sentence; empty where it does not."""
+    why = why_too_light(profile)
+    remedy = "correct [hull.M] in the profile, which is rigid body and added mass together, or the mass and inertia beside it"
+    return (f"{why}, and the fit starts from it. Fix: {remedy} (`ferryid vessel check`).",) if why else ()
 
 
 def _lost(opened: Sequence[Opened]) -> tuple[str, ...]:

@@ -19,8 +19,8 @@ from ferryid.identify.condition_problem import hull_and_conditions
 from ferryid.identify.contradictions import response_of, signs_of, wrong_size, wrong_way
 from ferryid.identify.feasible import Feasible, LiftTie, feasible_gains
 from ferryid.identify.fit_data import Estimate
-from ferryid.identify.inertia import relative_inertia, without_inertia
-from ferryid.identify.inertia_span import inertia_spans
+from ferryid.identify.inertia.shares import relative_inertia, without_inertia
+from ferryid.identify.inertia.span import inertia_spans
 from ferryid.identify.log_condition import KindOutcome, LogCondition, conditions_json
 from ferryid.identify.log_conditions import Conditions, Start, estimate_conditions
 from ferryid.identify.motion_data import LogData

@@ -13,7 +13,7 @@ from ferryid.counts import counted
 from ferryid.identify.excitation import sector_coverage
 from ferryid.identify.fit_data import Coefficients, Estimate
 from ferryid.identify.fit_warnings import general_warnings
-from ferryid.identify.inertia import axes_without_force
+from ferryid.identify.inertia.shares import axes_without_force
 from ferryid.identify.log_sums import pooled_deviation
 from ferryid.identify.log_windows import LogWindows, WindowPart
 from ferryid.identify.outcome import ArchivedLog, Excitation, LogFit

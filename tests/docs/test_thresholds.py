@@ -80,7 +80,7 @@ NO_DECISION = {
         diagnose.judging.responses ROUNDING
         diagnose.inference.coloured_noise LEAST_VARIANCE
         identify.acceptance _ROUNDING _NOTHING
-        identify.physical_checks _ROUNDING
+        identify.inertia.checks _ROUNDING
         identify.adaptive.averaging _SUM
         regression.bases.crossflow_integrals LEAST_SPEED_MPS
         regression.cross_products LARGEST

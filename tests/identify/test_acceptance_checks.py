@@ -14,8 +14,9 @@ from ferryid.identify import inputs
 from ferryid.identify.acceptance import Check
 from ferryid.identify.free_run_checks import free_run_checks, paired_interval
 from ferryid.identify.held_out_checks import held_out_checks, skill_checks
-from ferryid.identify.inertia import rigid_body
-from ferryid.identify.physical_checks import damping_checks, inertia_checks
+from ferryid.identify.inertia import inertia_checks
+from ferryid.identify.inertia.shares import rigid_body
+from ferryid.identify.physical_checks import damping_checks
 from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.settings import FitSettings
 from ferryid.models import ForceScores

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ferryid.identify.inertia_span import inertia_spans
+from ferryid.identify.inertia.span import inertia_spans
 from ferryid.regression import CrossProducts, Rows
 
 Floats = NDArray[np.float64]

@@ -11,7 +11,7 @@ import pytest
 
 from ferryid.errors import FerryIdError
 from ferryid.identify import inputs, pipeline
-from ferryid.identify.inertia import axes_without_force, implausible_inertia, without_inertia
+from ferryid.identify.inertia.shares import axes_without_force, implausible_inertia, without_inertia
 from ferryid.identify.outcome import FitOutcome
 from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.settings import FitSettings

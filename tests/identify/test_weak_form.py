@@ -21,7 +21,7 @@ from ferryid.identify import physical_checks as physical_checks_module
 from ferryid.identify.contradictions import signs_of, wrong_size, wrong_way
 from ferryid.identify.estimation import estimate_correction
 from ferryid.identify.feasible import Feasible, _nearest, feasible_gains
-from ferryid.identify.inertia import relative_inertia
+from ferryid.identify.inertia.shares import relative_inertia
 from ferryid.identify.motion_data import compute_residuals
 from ferryid.identify.physical_checks import physical_checks
 from ferryid.identify.pipeline import fit_logs

@@ -10,7 +10,7 @@ from ferryid.diagnose.data.path_comparison import PathComparison, compare_paths
 from ferryid.diagnose.inference.campaign import CommonHull
 from ferryid.diagnose.inference.campaign_properties import properties_of
 from ferryid.diagnose.inference.estimation import Candidate
-from ferryid.diagnose.inference.needed_correction import why_too_light
+from ferryid.diagnose.inference.needed_correction import note_on_light_hull
 from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.diagnose.inference.search import list_candidates
 from ferryid.diagnose.inference.simulation_baseline import (
@@ -120,8 +120,8 @@ class CampaignBaseline:
         library = tuple(
             one for one in _library(log) if not one.effect.of_log and (one.key not in lasting or one.effect.onset)
         )
-        light = "" if self.model is not None else why_too_light(self.profile)
-        return Expectation(force_model, spread, library, (*((f"{light}.",) if light else ()), self.hull.says(log.path)))
+        light = () if self.model is not None else note_on_light_hull(self.profile)
+        return Expectation(force_model, spread, library, (*light, self.hull.says(log.path)))
 
 
 def _library(log: AveragedLog) -> tuple[Candidate, ...]:

@@ -18,7 +18,7 @@ from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.effect import Effect, Parameter
 from ferryid.effects.force_model import COEFFICIENTS, UNITS, ForceModel
 from ferryid.effects.wording import listed
-from ferryid.identify import inertia_checks
+from ferryid.identify.inertia import inertia_checks
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError
-from ferryid.identify.inertia import without_inertia
+from ferryid.identify.inertia.shares import without_inertia
 from ferryid.identify.inputs import usable_logs
 from ferryid.identify.log_sums import LogSums, force_free_axes, sum_motions
 from ferryid.identify.model_selection import select_model

@@ -16,7 +16,7 @@ import numpy as np
 from ferryid.errors import FerryIdError
 from ferryid.identify.archived_logs import archived_folders
 from ferryid.identify.fit_data import Coefficients
-from ferryid.identify.inertia import without_inertia
+from ferryid.identify.inertia.shares import without_inertia
 from ferryid.identify.inputs import read_logs
 from ferryid.identify.log_windows import LogWindows, WindowPart, average_log
 from ferryid.identify.model_selection import Selection

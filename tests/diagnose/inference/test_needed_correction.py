@@ -10,7 +10,7 @@ import pytest
 
 from ferryid.diagnose.data.measurements import read_measurements, window_lengths
 from ferryid.diagnose.inference.estimation import Candidate, estimation_problem
-from ferryid.diagnose.inference.needed_correction import needed, why_too_light
+from ferryid.diagnose.inference.needed_correction import needed, note_on_light_hull
 from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.diagnose.inference.search import search
 from ferryid.diagnose.inference.weak_form import windows
@@ -49,7 +49,7 @@ def test_the_weak_thruster_is_named_beside_the_hull(tmp_path: Path, thruster: st
     profile = load_profile(str(made.profile))
     seen = windows(read_measurements(str(made.log), profile)[0], *window_lengths(profile))
     problem = estimation_problem(seen, *prior_force_model(seen.measurements, profile))
-    assert "0.4" in why_too_light(profile)
+    assert note_on_light_hull(profile)
     known = [Candidate.of(effects()["hull_parameters"], None, profile)]
     known += [Candidate.of(effects()["thruster_gain"], one.name, profile) for one in profile.actuators]
     found = search(problem, no_progress, known=known)
@@ -75,7 +75,7 @@ def test_what_no_hull_has_is_less_than_its_rigid_body(tmp_path: Path) -> None:
     """Less on one axis alone; a spread that the profile calls unknown is no hull model to correct."""
     problem = trial_on(sailed(tmp_path, "calm", CALM, 1))
     coefficients = Candidate.of(effects()["hull_parameters"], None, FERRY)
-    assert why_too_light(FERRY) == ""
+    assert note_on_light_hull(FERRY) == ()
     assert not needed(problem, coefficients)
     for place, mass in enumerate((FERRY.hull.mass_kg, FERRY.hull.mass_kg, None, None, FERRY.hull.inertia_z)):
         if mass is not None:
@@ -92,9 +92,9 @@ def test_a_campaign_says_that_the_profile_is_too_light() -> None:
     hull = FERRY.hull
     light = replace(FERRY, hull=replace(hull, M=hull.M * np.diag([0.3, 1.0, 1.0])))
     share = 0.3 * hull.M[0, 0] / hull.mass_kg
-    assert f"less than its rigid body's ({share:.2g} in surge), as no hull's is" in why_too_light(light)
-    assert why_too_light(replace(light, hull=replace(light.hull, spread=np.inf))) == ""
+    assert f"less than its rigid body's ({share:.2g} in surge), as no hull's is" in note_on_light_hull(light)[0]
+    assert note_on_light_hull(replace(light, hull=replace(light.hull, spread=np.inf))) == ()
     # The model may be right, and what it is compared with too large.
-    guessed = why_too_light(replace(FERRY, hull=replace(hull, inertia_z=1.5 * hull.inertia_z)))
+    (guessed,) = note_on_light_hull(replace(FERRY, hull=replace(hull, inertia_z=1.5 * hull.inertia_z)))
     assert "in yaw" in guessed
     assert "or mass_kg, inertia_z or k_zz_m where that is too large" in guessed

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ferryid.identify.physical_checks import light_base
+from ferryid.identify.inertia import why_too_light
 from ferryid.vessel import load_profile
 
 
-def test_a_hull_model_with_less_inertia_than_its_rigid_body_is_a_warning() -> None:
+def test_a_hull_model_with_less_inertia_than_its_rigid_body_is_said() -> None:
     ferry = load_profile("milliampere")
-    assert light_base(ferry) == ()
-    (warning,) = light_base(replace(ferry, hull=replace(ferry.hull, M=0.4 * ferry.hull.M)))
+    assert why_too_light(ferry) == ""
+    warning = why_too_light(replace(ferry, hull=replace(ferry.hull, M=0.4 * ferry.hull.M)))
     assert warning.startswith(
         "The inertia of the profile's hull model is less than its rigid body's (0.57 in surge, 0.61 in sway and 0.44 in yaw)"
     )
     # Where there is no hull model the base model is the rigid body itself.
-    assert light_base(load_profile("esso-osaka")) == ()
+    assert why_too_light(load_profile("esso-osaka")) == ""
