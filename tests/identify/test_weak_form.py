@@ -17,10 +17,10 @@ from ferryid.effects.hull_spread import default_hull_spread
 from ferryid.errors import FerryIdError
 from ferryid.identify import estimators, inputs
 from ferryid.identify import feasible as feasible_module
-from ferryid.identify import physical_checks as physical_checks_module
 from ferryid.identify.contradictions import signs_of, wrong_size, wrong_way
 from ferryid.identify.estimation import estimate_correction
 from ferryid.identify.feasible import Feasible, _nearest, feasible_gains
+from ferryid.identify.inertia import checks as inertia_checks_module
 from ferryid.identify.inertia.shares import relative_inertia
 from ferryid.identify.motion_data import compute_residuals
 from ferryid.identify.physical_checks import physical_checks
@@ -173,7 +173,7 @@ def test_an_inertia_at_its_bound_comes_with_what_the_windows_say_of_it(monkeypat
     # A bound below the truth, which the windows without noise know well.
     lower = replace(IDENTIFY, most_inertia=0.8 * float(relative_inertia(PROFILE, PROFILE.hull.M)[2]))
     monkeypatch.setattr(feasible_module, "IDENTIFY", lower)
-    monkeypatch.setattr(physical_checks_module, "IDENTIFY", lower)
+    monkeypatch.setattr(inertia_checks_module, "IDENTIFY", lower)
     estimate = estimate_correction(data, K, 0, no_progress)
     checks = physical_checks(data, data.combined(estimate.coefficients))
     (check,) = (one for one in checks if one.name == "inertia_yaw")
