@@ -76,6 +76,12 @@ class CheckThresholds:
         "width of the scale's interval above which no unit is named",
         "convention: units are a factor of 1.8 or more apart",
     )
+    scale_known: float = threshold(
+        0.25,
+        "of the factor",
+        "half of the interval of a velocity's scale above which it is a hint: the two are not in proportion",
+        "convention: an instrument that reads too much does so by a factor; one known to a quarter is hardly one",
+    )
     least_rate_scale: float = threshold(
         0.02, "-", "least error of a yaw rate's scale", "convention: above the scale error of a low-cost gyro"
     )

@@ -39,7 +39,16 @@ def find(measurements: Measurements) -> SensorFinding | None:
         f"{says.removesuffix('.')}: {unit[0][1]}." if unit else says,
         lambda measured: corrected(measured, right),
         found.evidence(SCALE),
+        doubt=_not_in_proportion(factor),
     )
+
+
+def _not_in_proportion(factor: Estimate) -> str:
+    """Return that velocities are no multiple of what positions give, as the end of a sentence; empty where they are."""
+    half = 0.5 * (factor.high - factor.low) / factor.value
+    if half <= CHECKS.scale_known:
+        return ""
+    return f"the factor is known to {100.0 * half:.0f} % of itself only: the velocities are not in proportion to the positions'"
 
 
 def says_of(values: Mapping[str, float]) -> str:
