@@ -13,7 +13,7 @@ from ferryid.report.validation_figures import Detected, confusion_matrix, detect
 from ferryid.types import AXES
 from ferryid.validation.case_sampling import KINDS, SEA_LOGS, cells
 from ferryid.validation.estimate_errors import EstimateErrors
-from ferryid.validation.page_parts import BEYOND, answers, error_figure, error_row, few, percent, render
+from ferryid.validation.page_parts import BEYOND, answers, error_figure, error_row, few, how_well_known, percent, render
 from ferryid.validation.plant.effects import plant_effects
 from ferryid.validation.plant.vessels import VESSELS
 from ferryid.validation.scores import CLEAN, Detection, Scores
@@ -63,6 +63,7 @@ def page(result: Mapping[str, Any], scores: Scores) -> str:
         "scores": scores,
         "vessels": [vessel.title for vessel in VESSELS.values()],
         "detections": [_detection(one) for one in _ordered(scores.detections)],
+        "how_well_known": how_well_known([one.blind for one in scores.detections]),
         "kinds": [_kind(kind, scores) for kind in KINDS if any(one.kind == kind for one in scores.cells)],
         "claims": [_claim(one) for one in scores.claims],
         "axes": AXES,

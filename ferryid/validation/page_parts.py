@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import isfinite
+from math import inf, isfinite, sqrt
 from typing import Any
 
 import numpy as np
 
+from ferryid.counts import counted, verb
 from ferryid.report.html import template
 from ferryid.report.validation_figures import Answers, parameter_errors
 from ferryid.types import Floats
@@ -20,6 +21,8 @@ BEYOND = 1.3
 """How far the axis of a detection curve goes beyond the sizes tried, as a factor."""
 POINTS = 120
 """Of a drawn curve."""
+KNOWN = 2.0
+"""A size that is known well is known to such a factor either way."""
 
 
 def render(
@@ -82,6 +85,24 @@ def answers(sizes: Sequence[float], named: Sequence[bool], fitted: Curve) -> Ans
     """Return runs with their fitted curve, for a figure."""
     x: Floats = np.geomspace(fitted.least, fitted.most, POINTS)
     return Answers(np.asarray(sizes), np.asarray(named, dtype=bool), x, fitted.share(x))
+
+
+def how_well_known(every: Sequence[Curve]) -> str:
+    """Return how well the sizes that are named 19 times in 20 are known, as a sentence; empty where none is among those tried.
+
+    A size is known to a factor of two where the ends of its interval are no more than four apart.
+    """
+    inside = [one for one in every if one.size is not None]
+    if not inside:
+        return ""
+    apart = [sqrt(one.high / one.low) if one.low > 0.0 and one.high < inf else inf for one in inside]
+    middle = float(np.median(apart))
+    text = f"a factor of {middle:.1f}" if isfinite(middle) else "no factor, as one end is open"
+    known = sum(one <= KNOWN for one in apart)
+    return (
+        f"Of {counted(len(every), 'such size')} {len(inside)} {verb(len(inside), 'is')} among the sizes tried and known to "
+        f"{text} either way in the median, {known} of them to a factor of two or better."
+    )
 
 
 def error_row(one: EstimateErrors) -> tuple[Any, ...]:
