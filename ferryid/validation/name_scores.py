@@ -25,6 +25,8 @@ NOT_CONFIRMED, NO_HULL_MODEL = "not confirmed: ", "The profile has no hull model
 """How a finding of a campaign says why it is a hint, and how the note begins that makes findings of a single log hints."""
 DROPPED = " considered, but dropped: "
 """What stands in a note between an effect and why it is none."""
+SIZES = "Estimated, not confirmed: "
+"""What stands there between the reason and the sizes."""
 NOT_TESTED, SINCE = "Not tested: ", ", since "
 """How a note begins on effects that were not tested, and what stands before the reason."""
 SMALLEST, TO_SHOW = "Would have been seen with an even chance, from: ", "To make sure: "
@@ -177,7 +179,7 @@ def why_missed(result: CaseResult, key: Key) -> str:
             reasons.append(why.removesuffix("."))
         what, found, why = note.partition(DROPPED)
         if found and title.lower() in what.lower():
-            reasons.append(why.removesuffix("."))
+            reasons.append(why.partition(SIZES)[0].strip(" ."))
     # This makes hints of findings; why there is none at all, or something without a name, it does not say.
     if hints and not any(reasons) and any(note.startswith(NO_HULL_MODEL) for note in result.diagnosis.notes):
         reasons.append("the hull was fitted to the same log, as the profile has none")

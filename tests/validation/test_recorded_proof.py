@@ -22,6 +22,7 @@ from ferryid.validation.name_scores import (
     NOT_CONFIRMED,
     NOT_TESTED,
     SINCE,
+    SIZES,
     SMALLEST,
     TO_SHOW,
     why_missed,
@@ -230,7 +231,8 @@ def test_why_effects_of_twice_the_oracles_size_were_missed_stands_on_the_page() 
     notes = (
         "The profile has no hull model, or one of unknown spread: take them as hints.",
         "Thruster force (port) is a hint: it makes the error in yaw 27 % larger.",
-        "Thruster force (port) and Payload were considered, but dropped: a law explains more.",
+        "Thruster force (port) and Payload were considered, but dropped: a law explains more. Estimated, not confirmed: "
+        "Thruster force (port): factor 0.90 (0.78 to 1.02).",
         "Thruster force (starboard) is a hint: it is another one.",
     )
     told, last = case((weak,), [own], **seen), case((weak,), [replace(hint, says="")], **seen)
@@ -321,7 +323,7 @@ def test_what_the_recording_has_of_an_effect_may_cancel_it() -> None:
     assert why(0.9, 0.15) == ["", ""]
 
 
-@pytest.mark.parametrize("words", [NOT_CONFIRMED, NO_HULL_MODEL, DROPPED, NOT_TESTED, SINCE, SMALLEST, TO_SHOW])
+@pytest.mark.parametrize("words", [NOT_CONFIRMED, NO_HULL_MODEL, DROPPED, SIZES, NOT_TESTED, SINCE, SMALLEST, TO_SHOW])
 def test_reasons_are_found_by_words_that_the_diagnosis_has(words: str) -> None:
     sources = Path(diagnose.__file__).parent.rglob("*.py")
     assert any(words in one.read_text("utf-8") for one in sources)

@@ -20,10 +20,10 @@ from ferryid.diagnose.judging.rivals import (
     with_both,
     without_companions,
 )
-from ferryid.diagnose.judging.size_estimates import size_estimates
+from ferryid.diagnose.judging.size_estimates import UNCONFIRMED, size_estimates, sizes_text
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.judging.unexplained import find_displaced
-from ferryid.effects.wording import listed
+from ferryid.effects.wording import listed, timed
 from ferryid.types import AXES
 
 PLACEBO = (
@@ -75,7 +75,7 @@ def eliminate_backward(
     progress
         Called with the name of each stage.
     """
-    fallen_by_reason: dict[str, list[str]] = {}
+    fallen_by_reason: dict[str, dict[str, str]] = {}
     tried, judged = {found.keys}, set[frozenset[tuple[object, ...]]]()
     kept, swaps = found, 0
     while kept.candidates:
@@ -112,7 +112,9 @@ def eliminate_backward(
             standings = tuple(without_companions(problem, kept, i, one) for i, one in enumerate(standings))
             return Elimination(kept, proof, standings, _told(fallen_by_reason, kept))
         if why:
-            fallen_by_reason.setdefault(why, []).append(kept.candidates[fallen].title)
+            fallen_by_reason.setdefault(why, {}).setdefault(
+                kept.candidates[fallen].title, _sizes(problem, kept, fallen)
+            )
         kept = prune(problem, without(problem, kept, fallen))
         tried.add(kept.keys)
     return Elimination(kept, None, (), _told(fallen_by_reason, kept))
@@ -130,19 +132,29 @@ def _standings(problem: EstimationProblem, kept: Fit, library: Sequence[Candidat
     )
 
 
-def _told(fallen_by_reason: Mapping[str, Sequence[str]], kept: Fit) -> tuple[str, ...]:
-    """Return a sentence for every reason; what is dropped twice for it, on the way, is named once.
+def _told(fallen_by_reason: Mapping[str, Mapping[str, str]], kept: Fit) -> tuple[str, ...]:
+    """Return for every reason what was dropped for it and what its sizes were estimated to be; sizes are by title.
 
     What fell and came back in the place of another stands, and is not called dropped.
     """
     stand = {one.title for one in kept.candidates}
     said = []
-    for why, titles in fallen_by_reason.items():
-        names = [title for title in dict.fromkeys(titles) if title not in stand]
-        if not names:
+    for why, sizes_by_title in fallen_by_reason.items():
+        fallen = {title: sizes for title, sizes in sizes_by_title.items() if title not in stand}
+        if not fallen:
             continue
-        said.append(f"{listed(names)} {'were' if len(names) > 1 else 'was'} considered, but dropped: {why}.")
+        dropped = f"{listed(list(fallen))} {'were' if len(fallen) > 1 else 'was'} considered, but dropped: {why}."
+        known = [(f"{title}: " if len(fallen) > 1 else "") + sizes for title, sizes in fallen.items() if sizes]
+        said.append(f"{dropped} {UNCONFIRMED}{'; '.join(known)}." if known else dropped)
     return tuple(said)
+
+
+def _sizes(problem: EstimationProblem, kept: Fit, i: int) -> str:
+    """Return the sizes of a candidate, and when it began and ended if it did; empty where none is known."""
+    one = kept.candidates[i]
+    sizes = sizes_text(size_estimates(problem, kept, i, profiled=False))
+    times = timed(*(getattr(one, end) if end in one.times else None for end in ("onset_s", "offset_s")))
+    return f"{sizes}; {times}" if sizes and times else sizes
 
 
 def _fallen(problem: EstimationProblem, kept: Fit, proof: HeldOutEvidence | None) -> tuple[int | None, str]:

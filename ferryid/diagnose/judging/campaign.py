@@ -23,9 +23,9 @@ from ferryid.diagnose.judging.claims import Claim, Figures
 from ferryid.diagnose.judging.credibility import campaign_hull
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.posterior import HullPosterior
+from ferryid.diagnose.judging.size_estimates import UNCONFIRMED, sizes_text
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.force_model import COEFFICIENTS, ForceModel
-from ferryid.effects.wording import parameter_word
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,8 @@ class JudgedCampaign:
         """What was tested over all logs, as sentences."""
         change = () if self.change is None else (self.change.says,)
         dropped = (
-            f"{one.candidate.title} was considered, but dropped: {one.undefended}. Estimated, not confirmed: {_told(one)}."
+            f"{one.candidate.title} was considered, but dropped: {one.undefended}. "
+            f"{UNCONFIRMED}{sizes_text(one.estimates)}."
             for one in self.undefended
         )
         return (*change, *dropped, *(note(one, self.hull.place) for one in self.conditions.tests))
@@ -130,16 +131,6 @@ class JudgedCampaign:
         if i is None or self.bare is None:
             return None
         return self.bare.whole_force_model(i), self.hull.fit.whole_force_model(i)
-
-
-def _told(test: PropertyTest) -> str:
-    """Return the estimates of a property with their 95 % intervals, as a part of a sentence."""
-    parts = []
-    for name, one in test.estimates.items():
-        value, low, high = (f"{number:z.{one.digits}f}" for number in (one.value, one.low, one.high))
-        unit = "" if one.unit == "-" else f" {one.unit}"
-        parts.append(f"{parameter_word(name)} {value}{unit} ({low} to {high})")
-    return "; ".join(parts)
 
 
 def judge_campaign(

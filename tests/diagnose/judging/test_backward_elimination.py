@@ -134,7 +134,9 @@ def test_what_helps_no_held_out_stretch_falls_and_is_told(problem: EstimationPro
     told = eliminate_backward(problem.with_noise_of(right), breeze, [], lambda stage: None)
     assert {one.key for one in told.fit.candidates} == {LOSS, FIRST}
     (sentence,) = told.dropped
-    assert sentence == f"{negligible[0].effect.title} was considered, but dropped: {PLACEBO}."
+    # With its size, which nothing confirms.
+    assert sentence.startswith(f"{negligible[0].effect.title} was considered, but dropped: {PLACEBO}. Estimated, not")
+    assert sentence.endswith(" north 0.2 m/s (-2.7 to 3.1); east 0.1 m/s (-2.8 to 3.0).")
 
 
 def test_what_makes_one_axis_worse_and_none_better_falls(problem: EstimationProblem) -> None:
@@ -165,17 +167,18 @@ def test_a_correction_that_is_needed_does_not_fall_for_harm(
 
 
 def test_what_fell_for_one_reason_is_one_sentence() -> None:
-    fallen = {LAW: ["Wind", "Current", "Wind"], PLACEBO: ["Payload"]}
+    fallen = {LAW: {"Wind": "north 2.0 m/s (1.0 to 3.0)", "Current": ""}, PLACEBO: {"Payload": "mass 50 kg (10 to 90)"}}
 
     def kept(*titles: str) -> Any:
         return SimpleNamespace(candidates=[SimpleNamespace(title=one) for one in titles])
 
     assert _told(fallen, kept("Mooring")) == (
-        f"Wind and Current were considered, but dropped: {LAW}.",
-        f"Payload was considered, but dropped: {PLACEBO}.",
+        f"Wind and Current were considered, but dropped: {LAW}. Estimated, not confirmed: Wind: north 2.0 m/s (1.0 to 3.0).",
+        f"Payload was considered, but dropped: {PLACEBO}. Estimated, not confirmed: mass 50 kg (10 to 90).",
     )
     # What came back stands among the findings.
-    assert _told(fallen, kept("Current", "Payload")) == (f"Wind was considered, but dropped: {LAW}.",)
+    (alone,) = _told(fallen, kept("Current", "Payload"))
+    assert alone == f"Wind was considered, but dropped: {LAW}. Estimated, not confirmed: north 2.0 m/s (1.0 to 3.0)."
 
 
 def test_what_is_too_small_to_matter_falls_without_a_word(problem: EstimationProblem) -> None:
