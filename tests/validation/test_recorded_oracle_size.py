@@ -173,7 +173,8 @@ def test_two_effects_are_concealed_one_after_the_other(monkeypatch: pytest.Monke
     monkeypatch.setattr(case_sampling, "baselines", lambda logs, vessel: baseline())
     monkeypatch.setattr(case_sampling, "unfollowed", lambda path, vessel: "")
     recording = Recording("ferry", ("short.bag",), "milliampere")
-    (case,) = case_sampling._of_pair(recording, [ferry()], ("thruster_gain", "time_delay"), 3, 1.0)
+    (case,), lacking = case_sampling._of_pair(recording, [ferry()], ("thruster_gain", "time_delay"), 3, 1.0)
+    assert lacking == []
     assert [one.effect for one in case.truths] == ["thruster_gain", "time_delay"]
     assert (case.kind, case.level) == ("pair", None)
     log = ferry()
@@ -188,7 +189,12 @@ def test_two_effects_are_concealed_one_after_the_other(monkeypatch: pytest.Monke
     assert late.min() == late.max() == round(1e9 * case.truths[1].values["seconds"])
     # A recording that is asked for one of them alone has no pair.
     alone = replace(recording, only=("payload",))
-    assert case_sampling._of_pair(alone, [ferry()], ("payload", "wind"), 3, 1.0) == []
+    assert case_sampling._of_pair(alone, [ferry()], ("payload", "wind"), 3, 1.0) == ([], [])
+    # Why a pair is not made has a line.
+    monkeypatch.setattr(case_sampling, "oracle_size", lambda *_: np.inf)
+    made, (one,) = case_sampling._of_pair(recording, [ferry()], ("thruster_gain", "time_delay"), 3, 1.0)
+    assert (made, one.effect, one.size) == ([], "thruster_gain and time_delay", 0.0)
+    assert "cannot be concealed in ferry: together, time_delay of 4 times the oracle's size is beyond 2 s." in one.why
 
 
 def test_what_forces_alone_show_is_not_concealed_where_the_vessel_does_not_follow_them(

@@ -130,7 +130,9 @@ def sample_recorded(recordings: Sequence[Recording], seed: int, runs: float, onl
             cases += made
             lacking += not_made
         for pair in PAIRS if (not only or "pair" in only) and not recording.before else ():
-            cases += _of_pair(recording, logs, pair, seed, runs * recording.runs)
+            made, not_made = _of_pair(recording, logs, pair, seed, runs * recording.runs)
+            cases += made
+            lacking += not_made
     if not cases:
         raise FerryIdError(f"--real: no recording can be used. The first: {lacking[0].why}")
     if not any(case.truths for case in cases):
@@ -259,30 +261,47 @@ def _worst(logs: Sequence[RecordedLog], case: Case) -> Concealed:
 
 def _of_pair(
     recording: Recording, logs: Sequence[RecordedLog], pair: tuple[str, str], seed: int, runs: float
-) -> list[Case]:
-    """Return the cases of two effects together; none where a recording cannot carry both, of which each has its own line."""
+) -> tuple[list[Case], list[NotMade]]:
+    """Return the cases of two effects together, and those that are not made.
+
+    Of a recording that cannot carry one of them whatever its size there is nothing: that effect has its own line.
+    """
     both = [concealments()[name] for name in pair]
     if recording.only and not set(pair) <= set(recording.only):
-        return []
+        return [], []
     if any(one.cannot(log) for one in both for log in logs) or any(_unfollowed(recording, logs, one) for one in both):
-        return []
-    cases = []
+        return [], []
+    cases, lacking, title = list[Case](), list[NotMade](), " and ".join(pair)
+
+    def not_made(why: str) -> NotMade:
+        return NotMade(recording.name, title, 0.0, f"{title} cannot be concealed in {recording.name}: {why}.")
+
     for number in range(max(1, round(runs))):
         rng = np.random.default_rng([seed, _key(recording, f"{' '.join(pair)} pair"), number])
-        truths = list[Truth]()
+        truths, beyond = list[Truth](), ""
         for one in both:
-            truth_of = _truth_of(logs, one, rng, None)
+            truth_of, most = _truth_of(logs, one, rng, None), one.sizes(logs[0])[1]
             size = IN_PAIRS * oracle_size(one, baselines(recording.logs, recording.vessel), truth_of)
-            if size <= one.sizes(logs[0])[1]:
-                truths.append(truth_of(size))
-        if len(truths) < len(both):
+            if size > most:
+                beyond = f"together, {one.id} of {IN_PAIRS:g} times the oracle's size is beyond {most:.3g} {one.unit}"
+            truths.append(truth_of(min(size, most)))
+        if beyond:
+            lacking.append(not_made(beyond))
             continue
-        case = replace(
-            _case(recording, logs, " and ".join(pair), "pair", rng, truths[0], None, IN_PAIRS), truths=tuple(truths)
-        )
-        if _worst(logs, case).missed <= MOST_MISSED and _left_over(logs, case) <= MOST_LEFT:
+        case = replace(_case(recording, logs, title, "pair", rng, truths[0], None, IN_PAIRS), truths=tuple(truths))
+        if (worst := _worst(logs, case)).missed > MOST_MISSED:
+            lacking.append(
+                not_made(f"together, {100.0 * worst.missed:.0f} % of the rows cannot express it, as {worst.why}")
+            )
+        elif (left := _left_over(logs, case)) > MOST_LEFT:
+            lacking.append(
+                not_made(
+                    f"together, {100.0 * left:.0f} % of the squared change of a force is another one than by the effect"
+                )
+            )
+        else:
             cases.append(replace(case, allowed=tuple(name for one in both for name in one.allowed)))
-    return cases
+    return cases, lacking
 
 
 def _truth_of(
