@@ -18,6 +18,7 @@ from ferryid.report.folder import PAGE, write_folder
 from ferryid.report.headline import headline_of
 from ferryid.report.interactive import write_assets
 from ferryid.report.model_text import describe_settings, error_ratio
+from ferryid.report.other_vessels import other_vessels
 from ferryid.report.outcome import Report
 from ferryid.report.page_process import PageProcess, started
 from ferryid.types import AXES, RunContext
@@ -85,15 +86,9 @@ def fit_and_report(
     FerryIdError
         For unusable input or an output folder that cannot be written; nothing half-written is left.
     """
-
-    def odd(paths: Sequence[str]) -> tuple[Mapping[str, str], tuple[str, ...]]:
-        # A fit of one log has no need of what diagnoses are made with, which takes a while to import.
-        from ferryid.diagnose import find_other_vessels
-
-        return find_other_vessels(paths, profile, run)
-
     with started(PageProcess, page) as process:
-        return _reported(fit_logs(logs, profile, settings, run, name=name, odd=odd), run, page, process)
+        found = fit_logs(logs, profile, settings, run, name=name, odd=other_vessels(profile, run))
+        return _reported(found, run, page, process)
 
 
 def fit_archive_and_report(

@@ -20,6 +20,7 @@ from ferryid.report.folder import made
 from ferryid.report.html import template, with_contents
 from ferryid.report.interactive import STATIC, Interactive
 from ferryid.report.next_steps import after_sweep
+from ferryid.report.other_vessels import other_vessels
 from ferryid.report.outcome import Report
 from ferryid.report.structures_figures import forest
 from ferryid.report.structures_text import count_terms, render_structures, supported_structure
@@ -44,7 +45,7 @@ def structures_and_report(
         raise FerryIdError("--archive: what is kept of a log is of one basis. Fix: name the logs to compare bases on")
     if windows_s:
         raise FerryIdError("--windows: bases are compared at one window. Fix: give --window")
-    found = sweep_structures(logs, profile, settings, run, folds=folds)
+    found = sweep_structures(logs, profile, settings, run, folds=folds, odd=other_vessels(profile, run))
     run.progress("writing the report")
     return leave(
         run,

@@ -11,6 +11,7 @@ from ferryid.report.folder import made, place_of, write_folder
 from ferryid.report.html import template, with_contents
 from ferryid.report.interactive import STATIC, Interactive, make_interactive
 from ferryid.report.next_steps import after_sweep
+from ferryid.report.other_vessels import other_vessels
 from ferryid.report.outcome import Report
 from ferryid.report.sweep_figures import curves, heat_cells, heat_map
 from ferryid.report.sweep_text import by_itself, fit_with, headline, render_sweep
@@ -32,7 +33,17 @@ def sweep_and_report(
     archive: bool = False,
 ) -> Report:
     """Sweep settings over logs and write the page; arguments and errors are those of `sweep_settings`."""
-    found = sweep_settings(what, logs, profile, settings, run, windows_s=windows_s, folds=folds, archive=archive)
+    found = sweep_settings(
+        what,
+        logs,
+        profile,
+        settings,
+        run,
+        windows_s=windows_s,
+        folds=folds,
+        archive=archive,
+        odd=other_vessels(profile, run),
+    )
     run.progress("writing the report")
     timelines = {k: sweep_timeline(found, choice) for k, choice in enumerate(found.by.values())}
     return leave(

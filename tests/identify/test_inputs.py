@@ -241,6 +241,18 @@ def test_sweeps_leave_out_the_same_logs(given: Given) -> None:
         assert [log["name"] for log in found.logs] == ["one", "two"]
         assert [note.split(":")[0] for note in found.notes[-2:]] == ["Left out of the sweep"] * 2
 
+    def odd(asked: Sequence[str]) -> tuple[Mapping[str, str], tuple[str, ...]]:
+        return {paths[4]: "no common hull fits it. Fix: fit it by itself"}, ("One may be another's.",)
+
+    paths = given({"one": sound(1), "foreign": None, "adrift": adrift(3), "two": sound(2), "three": sound(3)})
+    for found in (
+        sweep_settings("components", paths, PROFILE, settings, NOWHERE, odd=odd),
+        sweep_structures(paths, PROFILE, settings, NOWHERE, odd=odd),
+    ):
+        assert [log["name"] for log in found.logs] == ["one", "two"]
+        assert "One may be another's." in found.notes
+        assert f"Left out of the sweep: {paths[4]}: no common hull fits it. Fix: fit it by itself" in found.notes
+
 
 def test_logs_of_another_vessel_are_left_out_with_what_is_said_of_them(given: Given) -> None:
     paths = given({"one": sound(1), "foreign": None, "other": sound(3), "two": sound(2)})

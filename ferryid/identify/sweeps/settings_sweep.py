@@ -11,7 +11,7 @@ from ferryid.counts import counted
 from ferryid.effects.wording import listed
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.identify.archive import archive_folds
-from ferryid.identify.inputs import UsableLogs, usable_logs
+from ferryid.identify.inputs import OddLogs, UsableLogs, usable_logs
 from ferryid.identify.log_sums import folds_by_blocks, folds_by_logs, force_free_axes, sum_log
 from ferryid.identify.model_selection import Selection, select_model, windows_to_try
 from ferryid.identify.outcome import EstimatorScore
@@ -108,6 +108,7 @@ def sweep_settings(
     windows_s: Sequence[float] = (),
     folds: int = FOLDS,
     archive: bool = False,
+    odd: OddLogs | None = None,
 ) -> Sweep:
     """Cross-validate logs over windows and component counts of one estimator.
 
@@ -132,6 +133,8 @@ def sweep_settings(
         Number of folds by stretches, 2 to 20.
     archive
         True: take what is kept of the logs that were ingested to the output folder, all of them where `logs` is empty.
+    odd
+        Finds those of another vessel among several logs, which are left out; None does not ask.
 
     Raises
     ------
@@ -150,7 +153,7 @@ def sweep_settings(
     asked, settings = settings.estimator, replace(settings, windows_s=()).on(profile)
     if what != "window":
         settings = replace(settings, components="auto")
-    given = UsableLogs([]) if archive else usable_logs(logs, profile, settings, run, "sweep")
+    given = UsableLogs([]) if archive else usable_logs(logs, profile, settings, run, "sweep", odd)
     opened = tuple(given.opened)
     request = _Request(what, tuple(logs), opened, profile, settings, run, tuple(windows_s), folds, archive)
     kind, says, scores = _as_a_fit(request)
@@ -164,7 +167,7 @@ def sweep_settings(
             found = _sweep_derivative(request.of("derivative"))
     else:
         found = _sweep_derivative(request.of("derivative"))
-    notes = (*found.notes, *given.notes, *left_out_together(given.left_out))
+    notes = (*found.notes, *given.notes, *given.doubts, *left_out_together(given.left_out))
     return replace(found, notes=notes, asked=asked, estimator_says=says, estimators=scores)
 
 

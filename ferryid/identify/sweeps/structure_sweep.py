@@ -16,7 +16,7 @@ import numpy as np
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 from ferryid.identify.inertia.shares import without_inertia
-from ferryid.identify.inputs import usable_logs
+from ferryid.identify.inputs import OddLogs, usable_logs
 from ferryid.identify.log_sums import LogSums, force_free_axes, sum_motions
 from ferryid.identify.model_selection import select_model
 from ferryid.identify.rows import basis_for, known_rows, rows_of
@@ -55,12 +55,13 @@ def sweep_structures(
     run: RunContext,
     *,
     folds: int = FOLDS,
+    odd: OddLogs | None = None,
 ) -> StructureSweep:
     """Cross-validate every basis, decoupled and coupled.
 
     Parameters
     ----------
-    logs, profile, run, folds
+    logs, profile, run, folds, odd
         As in `ferryid.identify.sweeps.settings_sweep.sweep_settings`.
     settings
         How to fit. Of its basis only what stands behind ``+``, and a hull's length, count; of its structure nothing.
@@ -72,7 +73,7 @@ def sweep_structures(
     """
     check_folds(folds)
     usable, unusable = usable_bases(settings, profile)
-    given = usable_logs(logs, profile, replace(settings.on(profile), components="auto"), run, "sweep")
+    given = usable_logs(logs, profile, replace(settings.on(profile), components="auto"), run, "sweep", odd)
     opened = given.opened
     kind, says, scores = as_a_fit(opened, profile, settings.on(profile), run)
     asked, settings = settings.estimator, replace(settings, estimator=kind)
@@ -109,6 +110,7 @@ def sweep_structures(
             *_notes(by, settings),
             *log_warnings([(log["name"], log["warnings"]) for log in told]),
             *given.notes,
+            *given.doubts,
             *left_out_together(given.left_out),
         ),
         settings=settings,
