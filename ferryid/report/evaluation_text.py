@@ -9,8 +9,8 @@ import numpy as np
 from ferryid.report.scale import scale_words
 from ferryid.types import AXES
 
-_ROWS = ("row by row, MSE / base", "  rms error, {} [N, N, N·m]", "  R², model")
-_WINDOWS = ("squared prediction error / base", "  rms, {} [N, N, N·m]", "  R², model")
+_ROWS = ("row by row, MSE / base", "  rms error, {} [N, N, N·m]", "  R² against applied force")
+_WINDOWS = ("squared prediction error / base", "  rms, {} [N, N, N·m]", "  R² against applied force")
 HULL = "the profile's hull"
 NOT_ACCEPTED = (
     "marked as rejected: the diagnosis stored it without accepting it, so that it did not become the current one"

@@ -269,8 +269,8 @@ def _score_rows(scores: ForceScores) -> list[dict[str, Any]]:
         row("root-mean-square error, base [N, N, N·m]", np.sqrt(scores.mse_base), ".3g"),
         row("root-mean-square error, new [N, N, N·m]", np.sqrt(scores.mse_model), ".3g"),
         *constant,
-        row("R², base", scores.r2_base, ".3f"),
-        row("R², new", scores.r2_model, ".3f"),
+        row("R² against the applied force, base", scores.r2_base, ".3f"),
+        row("R² against the applied force, new", scores.r2_model, ".3f"),
     ]
 
 
