@@ -205,7 +205,9 @@ def as_text(result: FitOutcome, stored: StoredModel, report: Path | None) -> str
         errors.append(("the same, constant velocity", scores.mse_constant_velocity))
     for name, mse in errors:
         lines.append(f"{name:<28}" + "".join(f"{_three_digits(value):>12}" for value in np.sqrt(mse).tolist()))
-    lines.append(f"{'R² against applied force':<28}" + "".join(f"{_number(value):>12}" for value in scores.r2_model.tolist()))
+    lines.append(
+        f"{'R² against applied force':<28}" + "".join(f"{_number(value):>12}" for value in scores.r2_model.tolist())
+    )
     if model.settings.get("estimated_from"):
         lines.append(JUDGED)
     lines.append("")

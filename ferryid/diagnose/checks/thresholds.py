@@ -85,6 +85,30 @@ class CheckThresholds:
     least_rate_scale: float = threshold(
         0.02, "-", "least error of a yaw rate's scale", "convention: above the scale error of a low-cost gyro"
     )
+    turn_s: float = threshold(
+        60.0,
+        "s",
+        "length of the blocks of which a yaw rate's scale has a factor each",
+        "convention: a turn or two of a vessel",
+    )
+    fewest_turns: float = threshold(
+        4.0,
+        "-",
+        "blocks with as much of a turn as each other from which on the scatter of their factors is asked for",
+        "convention: a standard deviation of fewer values is off by half and more",
+    )
+    turns_alike: float = threshold(
+        0.95,
+        "of the turns",
+        "in which a yaw rate's factor is on the same side of 1 at least, or it is a hint",
+        "convention: an instrument that reads too much does so in every turn",
+    )
+    scale_without_bias: float = threshold(
+        0.5,
+        "of what the factor is off",
+        "by which a yaw rate's scale is off without a bias of the gyro at least: any factor and a bias explain a steady turn",
+        "convention: a gyro's bias is small beside the rates of a turn",
+    )
     rounding_share: float = threshold(
         0.01,
         "of the variance of the yaw rate",

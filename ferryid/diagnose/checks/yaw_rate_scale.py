@@ -13,8 +13,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from math import nan
 
 import numpy as np
+from scipy.stats import norm
 
 from ferryid.diagnose.checks.check import Check, Lasting, SensorFinding, mapped, rescaled
 from ferryid.diagnose.checks.heading_rounding import rounding_steps
@@ -42,6 +44,10 @@ class Rates:
         Factor, bias [rad/s] and delay [s] of the gyro.
     rival
         The factor by the regression on the rate.
+    without_bias
+        The factor of a gyro that has neither bias nor delay: the whole turn by the gyro over that by the heading.
+    scatter
+        Standard deviation of the factor from turn to turn; NaN with too few of them.
     middle_s
         Middle of the windows that were used [s], shape (J,).
     heading, gyro
@@ -50,15 +56,29 @@ class Rates:
 
     solution: Solution
     rival: float
+    without_bias: float
+    scatter: float
     middle_s: Floats
     heading: Floats
     gyro: Floats
 
     @property
+    def doubt(self) -> str:
+        """Why it may be no factor, as the end of a sentence; empty where nineteen in twenty turns are on one side of 1."""
+        if not self.scatter * float(norm.ppf(CHECKS.turns_alike)) > abs(self.solution.values[0] - 1.0):
+            return ""
+        return f"it scatters by {self.scatter:.3f} from turn to turn, as no gyro's does: the heading may err in turns"
+
+    @property
     def off(self) -> float:
-        """How far the factor is from 1 at least; 0 where the two regressions do not agree on which side."""
-        one, other = float(self.solution.values[0]) - 1.0, self.rival - 1.0
-        return min(abs(one), abs(other)) if one * other > 0.0 else 0.0
+        """How far the factor is from 1 at least; 0 where the two regressions do not agree on which side.
+
+        So it is where a factor comes from a bias alone: in a steady turn any factor does, beside a bias that makes up for it.
+        """
+        one, other, whole = float(self.solution.values[0]) - 1.0, self.rival - 1.0, self.without_bias - 1.0
+        if one * other <= 0.0 or whole * np.sign(one) < CHECKS.scale_without_bias * abs(one):
+            return 0.0
+        return min(abs(one), abs(other))
 
 
 def compared(measurements: Measurements) -> Rates | None:
@@ -87,7 +107,9 @@ def compared(measurements: Measurements) -> Rates | None:
     other = _step(Z, J, measured, problem)
     if solved is None or other is None:
         return None
-    return Rates(solved, float(other.values[0]), problem.middle_s, rate, measured)
+    whole = float(rate @ measured) / max(float(rate @ rate), 1e-300)
+    scatter = _scatter(rate, measured, problem)
+    return Rates(solved, float(other.values[0]), whole, scatter, problem.middle_s, rate, measured)
 
 
 def _windows(measurements: Measurements) -> tuple[Spans, Floats, Floats, Floats] | None:
@@ -127,6 +149,7 @@ def find(measurements: Measurements) -> SensorFinding | None:
         says_of({"factor": factor.value}),
         lambda measured: corrected(measured, factor.value),
         {"time_s": rates.middle_s, "heading_rate_radps": rates.heading, "yaw_rate_radps": rates.gyro},
+        doubt=rates.doubt,
     )
 
 
@@ -161,6 +184,22 @@ def _step(Z: Floats, J: Floats, measured: Floats, problem: Spans) -> Solution | 
     freedom = max(solved.freedom, int(len(left) / OVERLAP) - len(NEUTRAL))
     errors[0] = np.hypot(errors[0], CHECKS.filtered_scale)
     return Solution(solved.values, errors, freedom)
+
+
+def _scatter(rate: Floats, measured: Floats, problem: Spans) -> float:
+    """Return how much the factor scatters from one block of time to the next, each by its share of the turns.
+
+    NaN where turns are in too few blocks. Of a gyro it is the same in every turn. A compass that errs while a turn changes has
+    one in zigzags and none in steady circles.
+    """
+    block = ((problem.middle_s - problem.middle_s[0]) // CHECKS.turn_s).astype(np.intp)
+    turned = np.bincount(block, rate**2)
+    # So many blocks of equal turns (Kish 1965).
+    if turned.sum() ** 2 < CHECKS.fewest_turns * (turned @ turned):
+        return nan
+    factor = np.bincount(block, rate * measured)[turned > 0.0] / turned[turned > 0.0]
+    share = turned[turned > 0.0] / turned.sum()
+    return float(np.sqrt(share @ (factor - share @ factor) ** 2))
 
 
 def _growing(power: Floats, by: Floats, overlap: float) -> Floats:

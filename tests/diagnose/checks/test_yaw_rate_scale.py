@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.checks.heading_rounding import rounding_steps
-from ferryid.diagnose.checks.yaw_rate_scale import find
+from ferryid.diagnose.checks.yaw_rate_scale import compared, find
 from ferryid.effects.force_model import Measurements
 from ferryid.simulate import load_scenario
 from ferryid.simulate.sections import Navigation
 from ferryid.simulate.trial import sail
+from ferryid.types import Floats
 from ferryid.vessel.load import load_profile
 
 PROFILE = load_profile("milliampere")
@@ -107,3 +108,49 @@ def test_trials_with_rounded_headings(seed: int, digits_deg: float) -> None:
         assert (finding is None) == (factor == 1.0)
         if finding is not None:
             assert finding.parameters["factor"].low <= 0.95 <= finding.parameters["factor"].high
+
+
+def turning(rate_degps: Floats, heading_degps: Floats, step_s: float = 0.5) -> Measurements:
+    """Return a ship that turns at a rate, with a heading whose slope is another."""
+    n = len(rate_degps)
+    zero, rng = np.zeros(n), np.random.default_rng(4)
+    # The roll of a ship moves its compass by a degree and a half with a period of fifteen seconds.
+    swing = np.radians(1.5) * np.sin(
+        2.0 * np.pi * step_s * np.arange(n) / 15.0 + 0.3 * np.cumsum(rng.standard_normal(n))
+    )
+    psi = np.cumsum(np.radians(heading_degps)) * step_s + swing
+    nu = np.column_stack([zero + 4.0, zero, np.radians(rate_degps + 0.05 * rng.standard_normal(n))])
+    eta = np.column_stack([zero, zero, psi])
+    return Measurements(
+        PROFILE,
+        step_s * np.arange(n),
+        eta,
+        nu,
+        nu,
+        np.zeros((n, 2, 3)),
+        np.zeros((n, 2)),
+        np.ones(n, dtype=np.bool_),
+    )
+
+
+def test_a_steady_turn_shows_no_scale() -> None:
+    # The bias of a gyro that makes up for a factor of 0.3 would be 1.7 degrees a second.
+    rate = -2.4 - 0.3 * np.exp(-0.5 * np.arange(450) / 20.0)
+    rates = compared(turning(rate, rate))
+    assert rates is not None
+    assert (rates.solution.values[0], rates.without_bias) == (pytest.approx(0.0, abs=0.5), pytest.approx(1.0, abs=0.02))
+    assert find(turning(rate, rate)) is None
+    # One that is off by a tenth is off so without a bias, too, and turns to either side show it.
+    sides = 3.0 * np.sin(2.0 * np.pi * np.arange(1200) / 240.0)
+    assert find(turning(1.1 * sides, sides)) is not None
+
+
+def test_a_factor_that_differs_from_turn_to_turn_is_a_hint() -> None:
+    sides = 3.0 * np.sin(2.0 * np.pi * np.arange(2400) / 240.0)
+    # Every second of the blocks of a minute has a factor of 1.2, the others none.
+    uneven = np.where((np.arange(2400) // 120) % 2 == 0, 1.2, 1.0)
+    even, some = find(turning(1.1 * sides, sides)), find(turning(uneven * sides, sides))
+    assert even is not None
+    assert some is not None
+    assert even.doubt == ""
+    assert some.doubt.startswith("it scatters by 0.09")
