@@ -16,6 +16,7 @@ ORDERS = frozenset(
         "desired",
         "des",
         "setpoint",
+        "set",
         "sp",
         "target",
         "goal",

@@ -20,7 +20,7 @@ from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import ForceModel, touches
 from ferryid.effects.simulated import Simulated, entry
 from ferryid.effects.thresholds import EFFECTS
-from ferryid.effects.wording import bearing
+from ferryid.effects.wording import amount, bearing
 from ferryid.types import Floats
 from ferryid.vessel.frames import to_body
 from ferryid.vessel.profile import Profile
@@ -64,8 +64,8 @@ def says(values: Values, instance: str | None) -> str:
     """Return the finding as a sentence."""
     north, east = values["north"], values["east"]
     return (
-        f"Something from outside, such as a hand, a tug or the quay, pushed the hull with {hypot(north, east):.0f} N towards "
-        f"{bearing(degrees(atan2(east, north)))} and a moment of {values['moment']:.0f} N·m."
+        f"Something from outside, such as a hand, a tug or the quay, pushed the hull with {amount(hypot(north, east))} N "
+        f"towards {bearing(degrees(atan2(east, north)))} and a moment of {amount(values['moment'])} N·m."
     )
 
 

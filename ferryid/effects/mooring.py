@@ -11,6 +11,7 @@ from ferryid.effects.effect import Effect, Parameter, Values, span
 from ferryid.effects.force_model import ForceModel, Measurements, touches
 from ferryid.effects.simulated import Simulated
 from ferryid.effects.thresholds import EFFECTS
+from ferryid.effects.wording import amount
 from ferryid.types import Floats
 from ferryid.vessel.frames import to_body
 from ferryid.vessel.profile import Profile
@@ -67,17 +68,17 @@ def doubt_where(values: Values, measurements: Measurements) -> str:
     if change >= EFFECTS.least_pull_change * mean:
         return ""
     return (
-        f"its pull is {mean:.0f} N on average and changes by {change:.0f} N where the vessel was: a wind, a current and the "
-        "drift of waves push like that, too"
+        f"its pull is {amount(mean)} N on average and changes by {amount(change)} N where the vessel was: a wind, a current "
+        "and the drift of waves push like that, too"
     )
 
 
 def says(values: Values, instance: str | None) -> str:
     """Return the finding as a sentence."""
     return (
-        f"Something holds the vessel like a spring of {values['stiffness_north']:.1f} N/m (north) and "
-        f"{values['stiffness_east']:.1f} N/m (east) from {values['north']:.0f} m north, {values['east']:.0f} m east: a mooring "
-        "line or a tow."
+        f"Something holds the vessel like a spring of {amount(values['stiffness_north'])} N/m (north) and "
+        f"{amount(values['stiffness_east'])} N/m (east) from {values['north']:.0f} m north, {values['east']:.0f} m east: a "
+        "mooring line or a tow."
     )
 
 

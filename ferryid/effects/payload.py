@@ -13,6 +13,7 @@ import numpy as np
 from ferryid.effects.effect import Effect, Parameter, Values, span
 from ferryid.effects.force_model import ForceModel, Measurements, aboard, added_mass, touches
 from ferryid.effects.thresholds import EFFECTS
+from ferryid.effects.wording import amount
 from ferryid.types import Floats
 from ferryid.vessel.dimensions import off_hull
 from ferryid.vessel.profile import Profile
@@ -77,8 +78,8 @@ def cannot(measurements: Measurements) -> str:
 
 def says(values: Values, instance: str | None) -> str:
     """Return the finding as a sentence."""
-    word = "more" if values["mass"] > 0.0 else "less"
-    return f"The vessel carried {abs(values['mass']):.0f} kg {word} than the hull model allows for, {whereabouts(values['x'])}."
+    mass = f"{amount(abs(values['mass']))} kg {'more' if values['mass'] > 0.0 else 'less'}"
+    return f"The vessel carried {mass} than the hull model allows for, {whereabouts(values['x'])}."
 
 
 def whereabouts(x: float) -> str:
@@ -93,7 +94,7 @@ def doubt(values: Values, profile: Profile) -> str:
     if share > EFFECTS.heaviest_load:
         return f"the load would be {100.0 * share:.0f} % of the vessel's own mass, more than one carries"
     if mass < 0.0:
-        return f"the vessel would be {-mass:.0f} kg lighter than it is empty"
+        return f"the vessel would be {amount(-mass)} kg lighter than it is empty"
     return off_hull(profile, x, 0.0)
 
 

@@ -17,6 +17,7 @@ from ferryid.counts import plural
 from ferryid.effects.effect import Effect, Parameter, Process, Processes, Values
 from ferryid.effects.force_model import ForceModel
 from ferryid.effects.thresholds import EFFECTS
+from ferryid.effects.wording import amount
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
 
@@ -75,7 +76,7 @@ def doubt(values: Values, profile: Profile) -> str:
 def says(values: Values, instance: str | None) -> str:
     """Return the finding as a sentence: the period is that of the force, which long waves have less of than their height."""
     forces = [
-        f"{values[name]:.0f} {unit}" for name, unit in (("force_std", "N"), ("moment_std", "N·m")) if name in values
+        f"{amount(values[name])} {unit}" for name, unit in (("force_std", "N"), ("moment_std", "N·m")) if name in values
     ]
     return (
         f"Waves pushed the vessel with {' and '.join(forces)} ({plural(len(forces), 'standard deviation')}), most at a "

@@ -41,6 +41,11 @@ def bearing(degrees: float) -> str:
     return f"{round(degrees) % 360} deg ({compass_point(degrees)})"
 
 
+def amount(value: float) -> str:
+    """Return a force, mass or stiffness in whole units from 10 on, else to two digits: on a small boat, 0.29 N·m are not 0."""
+    return f"{value:.0f}" if abs(value) >= 9.95 else f"{value:#.2g}".rstrip(".")
+
+
 def weak_evidence(evidence: float, least: float) -> str:
     """Return that logs hardly speak for something, as the end of a sentence; evidence over none, and what is needed [nat]."""
     if evidence < 0.05:

@@ -422,6 +422,7 @@ def test_a_heading_that_the_motion_does_not_show_is_to_be_checked(tmp_path: Path
         ("linear.y", "no field"),
         ("depth", "no field"),
         ("motor_speed", "no field"),
+        ("SpeedSet", "no field"),
         ("wind_speed", "no field"),
     ],
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from ferryid.effects import effects
-from ferryid.effects.wording import bearing, compass_point, listed, weak_evidence
+from ferryid.effects.wording import amount, bearing, compass_point, listed, weak_evidence
 from ferryid.vessel import load_profile
 
 
@@ -25,6 +25,31 @@ from ferryid.vessel import load_profile
 )
 def test_the_nearest_of_sixteen_points(degrees: float, word: str) -> None:
     assert compass_point(degrees) == word
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [(104.4, "104"), (9.96, "10"), (9.94, "9.9"), (1.04, "1.0"), (0.29, "0.29"), (-0.0451, "-0.045"), (0.0, "0.0")],
+)
+def test_an_amount_has_two_digits_where_it_is_small(value: float, said: str) -> None:
+    assert amount(value) == said
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "said"),
+    [
+        ("waves", {"peak_frequency": 1.05, "moment_std": 0.29}, "with 0.29 N·m (standard deviation)"),
+        ("external_push", {"north": 0.3, "east": 0.0, "moment": 0.04}, "with 0.30 N towards"),
+        ("payload", {"mass": 0.45, "x": 0.1}, "carried 0.45 kg more"),
+        (
+            "mooring",
+            {"stiffness_north": 0.045, "stiffness_east": 0.02, "north": 1.0, "east": 2.0},
+            "of 0.045 N/m (north) and 0.020 N/m (east)",
+        ),
+    ],
+)
+def test_what_is_small_on_a_small_boat_is_not_nothing(effect: str, values: dict[str, float], said: str) -> None:
+    assert said in effects()[effect].says(values, None)
 
 
 def test_a_bearing_stays_below_a_full_circle() -> None:

@@ -16,6 +16,7 @@ from ferryid.diagnose.checks.check import Check, SensorFinding
 from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
+from ferryid.effects.wording import amount
 from ferryid.signals.complementary_filter import velocity_from_pose
 from ferryid.signals.smooth import moving_mean, odd_rows
 from ferryid.types import Floats
@@ -58,8 +59,8 @@ def find(measurements: Measurements) -> SensorFinding | None:
             "duration": Estimate(seconds, seconds, seconds, "s"),
             "force": Estimate(hardest, hardest - 1.96 * error, hardest + 1.96 * error, "N"),
         },
-        f"For {seconds:.0f} s every recorded actuator was idle, yet the vessel speeded up as with {hardest:.0f} N, {share:.0f} "
-        "% of the most that was recorded: it was driven by something that was not recorded.",
+        f"For {seconds:.0f} s every recorded actuator was idle, yet the vessel speeded up as with {amount(hardest)} N, "
+        f"{share:.0f} % of the most that was recorded: it was driven by something that was not recorded.",
         correct,
         {
             "time_s": measurements.t,

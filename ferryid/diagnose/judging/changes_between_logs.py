@@ -19,7 +19,7 @@ from ferryid.diagnose.judging.difference import Difference
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.group_differences import judged_difference
 from ferryid.effects.payload import whereabouts
-from ferryid.effects.wording import ALL_THRUSTERS, listed
+from ferryid.effects.wording import ALL_THRUSTERS, amount, listed
 from ferryid.files import name_of_log
 from ferryid.types import AXES, Flags
 
@@ -104,7 +104,7 @@ def _load(change: Change, estimates: Mapping[str, Estimate], others: str) -> tup
     """Return what is aboard, and how it came to be so."""
     mass, x = (estimates[name].value for name in ("mass", "x"))
     how = "a load came aboard" if change.after else "a load was put ashore"
-    return f"Aboard were {mass:.0f} kg more than {others}, {whereabouts(x)}", how
+    return f"Aboard were {amount(mass)} kg more than {others}, {whereabouts(x)}", how
 
 
 def _loss_of_force(change: Change, estimates: Mapping[str, Estimate], others: str) -> tuple[str, str]:

@@ -440,9 +440,15 @@ def not_credible(finding: Finding, context: Context, _threshold: float) -> Outco
 
 @rule()
 def beside_incredible_hull(finding: Finding, context: Context, _threshold: float) -> Outcome:
-    """Lower what was estimated beside a hull that cannot be the vessel's: each may have made up for the other."""
-    of_all = context.own.kind in ("condition", "property")
-    doubt = context.log.common_hull_doubt if of_all else context.log.hull_doubt
+    """Lower what was estimated beside a hull that cannot be the vessel's: each may have made up for the other.
+
+    What shakes a hull is what its equation leaves over: in a log of a campaign, it rests on the hull of all logs, unless it
+    stands out against every force that the motion decides.
+    """
+    log, own = context.log, context.own
+    of_all = own.kind in ("condition", "property")
+    beside_all = own.kind == "disturbance" and not (own.sets_in or own.beyond_hull)
+    doubt = log.common_hull_doubt if of_all else log.hull_doubt or (log.common_hull_doubt if beside_all else "")
     return _because(finding, doubt) if doubt and context.own.kind != "sensor" else (finding, "")
 
 

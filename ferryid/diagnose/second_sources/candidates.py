@@ -20,7 +20,8 @@ Kind = str
 
 _NUMBERS = ("float", "double", "int", "uint", "real")
 _ORDERS = {
-    *("ref", "reference", "desired", "des", "setpoint", "sp", "target", "goal", "cmd", "command", "commanded", "order"),
+    *("ref", "reference", "desired", "des", "setpoint", "set", "sp", "target", "goal", "cmd", "command", "commanded"),
+    "order",
     *("error", "err", "covariance", "cov", "variance", "std", "accuracy", "dop", "hdop", "offset", "bias", "waypoint"),
     *("simulated", "predicted", "planned"),
 }

@@ -19,6 +19,7 @@ from ferryid.diagnose.judging.confidence_rules import (
     absent_in_velocities,
     apply_rules,
     begins_as_no_event,
+    beside_incredible_hull,
     few_cycles,
     hull_from_this_log,
     improves_no_claimed_axis,
@@ -445,6 +446,20 @@ def test_a_force_beside_the_hull_of_one_other_log_is_a_hint(logs: int, known: bo
     notes = log_notes(figures)
     assert (not notes) == sure
     assert sure or "fitted to this log and one other beside the findings" in notes[0]
+
+
+@pytest.mark.parametrize("kind", ["disturbance", "condition", "property"])
+def test_what_stands_beside_a_hull_of_all_logs_that_cannot_be_is_a_hint(kind: Kind) -> None:
+    figures = LogFigures(hull_known=False, joint=True, hull_logs=3, common_hull_doubt="no such hull")
+    assert not stands(beside_incredible_hull, found("waves"), Context(Figures(kind), figures))
+    assert stands(
+        beside_incredible_hull, found("waves"), Context(Figures(kind), replace(figures, common_hull_doubt=""))
+    )
+    # What sets in within the log, a force of the log and sensors do not rest on that hull.
+    assert stands(beside_incredible_hull, found("waves"), Context(Figures("disturbance", sets_in=True), figures))
+    assert stands(beside_incredible_hull, found("waves"), Context(Figures("force"), figures))
+    assert stands(beside_incredible_hull, found("waves"), Context(Figures("disturbance", beyond_hull=True), figures))
+    assert stands(beside_incredible_hull, found("waves"), Context(Figures("sensor"), figures))
 
 
 def test_a_weak_thruster_in_a_part_of_one_log_is_no_event_where_the_logs_bring_the_hull() -> None:

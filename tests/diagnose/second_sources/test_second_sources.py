@@ -167,6 +167,7 @@ def topic(name: str, fields: str, kind: str = "a/msg/B") -> Topic:
         ("/imu", "linear_acceleration.x linear_acceleration.y linear_acceleration.z", ""),
         ("/compass", "data", "heading"),
         ("/desired_heading", "data", ""),
+        ("table", "HeadingSet SpeedSet", ""),
         ("/ref", "x y theta", ""),
         ("/ins_pose", "x y theta", "position heading"),
         ("/fix", "latitude longitude altitude", "position"),
