@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import hypot, inf
 from typing import ClassVar, Protocol
 
@@ -12,7 +12,7 @@ import numpy as np
 from ferryid.diagnose import Estimate
 from ferryid.json_record import Record
 from ferryid.validation.case import Truth, parameter_vectors
-from ferryid.validation.name_scores import Share, named_findings
+from ferryid.validation.name_scores import Share, label, named_findings
 from ferryid.validation.plant.effects import plant_effects
 from ferryid.validation.records import CaseResult, Finding
 
@@ -20,6 +20,30 @@ WITHIN = 0.1
 """Relative error of a parameter that is small."""
 IN_TIME_S = 5.0
 """Error of an onset or offset that is small [s]."""
+
+
+@dataclass(frozen=True)
+class Outside(Record):
+    """An interval that does not hold the truth.
+
+    Attributes
+    ----------
+    cell
+        Of the case.
+    effect, parameter, truth
+        Whose estimate, and what it should have been.
+    estimate
+        With its 95 % interval.
+    beside
+        What else was in the log, and what else was named of it.
+    """
+
+    cell: str
+    effect: str
+    parameter: str
+    truth: float
+    estimate: Estimate
+    beside: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -40,6 +64,8 @@ class EstimateErrors(Record):
         Errors of onsets and offsets [s], infinite where none was found.
     times_held
         Onsets and offsets whose 95 % interval holds the truth.
+    outside
+        The intervals that do not hold it.
     """
 
     DERIVED: ClassVar[Mapping[str, str]] = {name: name for name in ("median_error", "within", "covered", "in_time")}
@@ -50,6 +76,7 @@ class EstimateErrors(Record):
     reaches: tuple[float, ...]
     times_s: tuple[float, ...]
     times_held: Share
+    outside: tuple[Outside, ...] = ()
 
     @property
     def median_error(self) -> float:
@@ -100,8 +127,18 @@ def estimate_errors(
         for truth in result.truths:
             if truth.key in named:
                 one = named[truth.key]
-                errors = _errors(truth, known[truth.effect], result.values(truth, one), one)
-                found.setdefault(truth.effect, []).append(errors)
+                values = result.values(truth, one)
+                errors = _errors(truth, known[truth.effect], values, one)
+                others = dict.fromkeys(label(key) for key in (*(each.key for each in result.truths), *named))
+                beside = tuple(other for other in others if other != label(truth.key))
+                outside = tuple(
+                    Outside(result.case.cell, label(truth.key), name, value, one.parameters[name], beside)
+                    for vector in parameter_vectors(list(values))
+                    if all(name in one.parameters for name in vector)
+                    for name, value in ((name, values[name]) for name in vector)
+                    if _reach(one.parameters[name], value) > 1.0
+                )
+                found.setdefault(truth.effect, []).append(replace(errors, outside=outside))
     every = [one for some in found.values() for one in some]
     return (_joined("all", every), *(_joined(effect, found[effect]) for effect in sorted(found)))
 
@@ -135,6 +172,7 @@ def _joined(effect: str, some: Sequence[EstimateErrors]) -> EstimateErrors:
         tuple(reach for one in some for reach in one.reaches),
         tuple(error for one in some for error in one.times_s),
         Share(sum(one.times_held.count for one in some), sum(one.times_held.of for one in some)),
+        tuple(each for one in some for each in one.outside),
     )
 
 

@@ -155,6 +155,11 @@ def hints_not_in_log(result: CaseResult) -> list[Key]:
     return [one.key for one in hints if one.effect != UNKNOWN and one.key not in present]
 
 
+def label(key: Key) -> str:
+    """Return an effect with its thruster in one word or two."""
+    return key[0] if key[1] is None else f"{key[0]} ({key[1]})"
+
+
 def outcome_of_missed(result: CaseResult, key: Key) -> str:
     """Return what became of an effect that is in the log of a case and was not named."""
     diagnosis = result.diagnosis

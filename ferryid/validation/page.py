@@ -13,7 +13,17 @@ from ferryid.report.validation_figures import Detected, confusion_matrix, detect
 from ferryid.types import AXES
 from ferryid.validation.case_sampling import KINDS, SEA_LOGS, cells
 from ferryid.validation.estimate_errors import EstimateErrors
-from ferryid.validation.page_parts import BEYOND, answers, error_figure, error_row, few, how_well_known, percent, render
+from ferryid.validation.page_parts import (
+    BEYOND,
+    answers,
+    error_figure,
+    error_row,
+    few,
+    how_well_known,
+    outside_row,
+    percent,
+    render,
+)
 from ferryid.validation.plant.effects import plant_effects
 from ferryid.validation.plant.vessels import VESSELS
 from ferryid.validation.scores import CLEAN, Detection, Scores
@@ -138,6 +148,7 @@ def _sea(scores: SeaScores) -> dict[str, Any]:
         "logs": SEA_LOGS,
         "every": first,
         "median_error": percent(first.median_error),
+        "outside": [outside_row(one) for one in first.outside],
         "apart": _winds_apart(others),
         "errors": [error_row(one) for one in others],
     }

@@ -13,7 +13,7 @@ from ferryid.report.html import template
 from ferryid.report.validation_figures import Answers, parameter_errors
 from ferryid.types import Floats
 from ferryid.validation.detection_curves import Curve
-from ferryid.validation.estimate_errors import WITHIN, EstimateErrors
+from ferryid.validation.estimate_errors import WITHIN, EstimateErrors, Outside
 from ferryid.validation.name_scores import Share
 from ferryid.validation.targets import Target
 
@@ -61,6 +61,7 @@ def render(
         "median_error": percent(every.median_error),
         "errors": [error_row(one) for one in recoveries[1:]],
         "has_errors": any(one.errors for one in recoveries[1:]),
+        "outside": [outside_row(one) for one in every.outside],
     }
     return template(name).render({**shared, **context})
 
@@ -108,6 +109,13 @@ def how_well_known(every: Sequence[Curve]) -> str:
 def error_row(one: EstimateErrors) -> tuple[Any, ...]:
     """Return errors of the parameters of one effect as cells of a table."""
     return one.effect, one.found, percent(one.median_error), few(one.within), few(one.covered), few(one.in_time)
+
+
+def outside_row(one: Outside) -> tuple[str, ...]:
+    """Return an interval that does not hold the truth as cells of a table."""
+    found = one.estimate
+    interval = f"{found.value:.3g} ({found.low:.3g} to {found.high:.3g})"
+    return one.cell, one.effect, one.parameter, f"{one.truth:.3g}", interval, ", ".join(one.beside) or "nothing"
 
 
 def few(share: Share) -> str:

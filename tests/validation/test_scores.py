@@ -165,6 +165,10 @@ def test_errors_are_those_of_vectors_and_intervals_those_of_parameters() -> None
     assert wind.errors == pytest.approx((0.08,))
     assert wind.reaches == pytest.approx((0.24 / 0.3, 0.32 / 0.3))
     assert wind.covered == Share(1, 2)
+    # The one that does not hold the truth is kept with what else was there.
+    (one,) = wind.outside
+    assert (one.effect, one.parameter, one.truth, one.estimate.value, one.beside) == ("wind", "east", 4.0, 4.32, ())
+    assert everything.outside == (one,)
     assert gain.errors == pytest.approx((0.05, 0.0))
     assert gain.times_s == (4.0, inf)
     assert (gain.in_time, gain.times_held) == (Share(1, 2), Share(0, 2))

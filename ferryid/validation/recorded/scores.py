@@ -12,7 +12,7 @@ from ferryid.json_record import Record
 from ferryid.validation.case import Case, Truth
 from ferryid.validation.detection_curves import Curve, common_slopes, curve
 from ferryid.validation.estimate_errors import EstimateErrors, estimate_errors
-from ferryid.validation.name_scores import HULL, Share, names, outcome_of_missed, why_missed, wrong_names
+from ferryid.validation.name_scores import HULL, Share, label, names, outcome_of_missed, why_missed, wrong_names
 from ferryid.validation.recorded.case_sampling import NotMade
 from ferryid.validation.recorded.doses import Doses, joined
 from ferryid.validation.recorded.effects import Concealment, concealments
@@ -395,11 +395,6 @@ def _together(concealed: float, own: float | None, known: Concealment) -> float:
     if own is None or known.positions:
         return concealed
     return own * concealed if known.neutral == 1.0 else own + concealed
-
-
-def label(key: Key) -> str:
-    """Return an effect with its thruster in one word or two."""
-    return key[0] if key[1] is None else f"{key[0]} ({key[1]})"
 
 
 def from_twice_distinct(responses: Sequence[DoseResponse]) -> Share:
