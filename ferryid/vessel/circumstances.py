@@ -8,6 +8,7 @@ from math import cos, sin
 
 import numpy as np
 
+from ferryid.vessel.order_response import orders_alone
 from ferryid.vessel.profile import Actuator, Profile
 
 SMALL_LEVER = 1e-6
@@ -47,15 +48,19 @@ class Circumstances:
         One of `ferryid.vessel.profile.SETTINGS`; empty where that is not known.
     drive
         What its actuators can do.
+    followed_unseen
+        True where the actuators are known by their orders alone, and the profile does not state how late these are followed.
     """
 
     setting: str = ""
     drive: Drive = Drive()
+    followed_unseen: bool = False
 
     @classmethod
     def of(cls, profile: Profile) -> Circumstances:
         """Return those that a profile states."""
-        return cls(profile.setting, drive_of(profile.actuators))
+        unseen = orders_alone(profile) and not any(one.states_response for one in profile.signals)
+        return cls(profile.setting, drive_of(profile.actuators), unseen)
 
 
 ANYWHERE = Circumstances()

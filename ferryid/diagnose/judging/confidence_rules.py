@@ -507,6 +507,20 @@ def lasting(finding: Finding) -> bool:
     return known is not None and known.vessel and finding.onset_s is None and finding.offset_s is None
 
 
+@rule(of_name=True)
+def orders_followed_late(finding: Finding, context: Context, _threshold: float) -> Outcome:
+    """Leave a delay after orders without feedback unresolved: thrusters that follow late look like a late navigation."""
+    if finding.effect != "time_delay" or not context.log.circumstances.followed_unseen:
+        return finding, ""
+    seconds = finding.parameters["seconds"].value
+    if seconds <= 0.0:
+        return finding, ""
+    lags = f"The motion lags the actuators' orders by {seconds:.2f} s"
+    says = f"{lags}: thrusters follow them late, or the navigation's data are late.{finding.says.partition(' s.')[2]}"
+    unresolved = tuple(dict.fromkeys((*finding.unresolved_with, "thruster_lag")))
+    return replace(finding, says=says, unresolved_with=unresolved), ""
+
+
 RULES: tuple[ConfidenceRule, ...] = (
     in_baseline,
     nothing_estimated,
@@ -535,6 +549,7 @@ RULES: tuple[ConfidenceRule, ...] = (
     absent_in_other_logs,
     not_of_all_logs,
     begins_as_no_event,
+    orders_followed_late,
 )
 """In the order in which they are applied: what a rule reads of other findings has been settled by those before it."""
 

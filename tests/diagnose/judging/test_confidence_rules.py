@@ -31,6 +31,7 @@ from ferryid.diagnose.judging.confidence_rules import (
     not_of_all_logs,
     nothing_beside_another,
     nothing_estimated,
+    orders_followed_late,
     out_of_step_beside_disturbance,
     passes_by_little,
     place_visited_once,
@@ -460,6 +461,28 @@ def test_what_stands_beside_a_hull_of_all_logs_that_cannot_be_is_a_hint(kind: Ki
     assert stands(beside_incredible_hull, found("waves"), Context(Figures("force"), figures))
     assert stands(beside_incredible_hull, found("waves"), Context(Figures("disturbance", beyond_hull=True), figures))
     assert stands(beside_incredible_hull, found("waves"), Context(Figures("sensor"), figures))
+
+
+def test_a_delay_after_orders_alone_may_be_that_of_thrusters() -> None:
+    def late(seconds: float, *, unseen: bool) -> Finding:
+        estimate = {"seconds": Estimate(seconds, seconds - 0.03, seconds + 0.03, "s")}
+        one = replace(found("time_delay"), parameters=estimate, says="The data lag by 0.19 s. All logs show it.")
+        figures = LogFigures(circumstances=Circumstances(followed_unseen=unseen))
+        made, note = orders_followed_late(one, Context(Figures("property"), figures))
+        assert made is not None
+        assert (made.probability, note) == (one.probability, "")
+        return made
+
+    unresolved = late(0.19, unseen=True)
+    assert unresolved.unresolved_with == ("thruster_lag",)
+    assert unresolved.says == (
+        "The motion lags the actuators' orders by 0.19 s: thrusters follow them late, or the navigation's data are late. All "
+        "logs show it."
+    )
+    # Feedback is of what acted, and nothing moves before it is pushed.
+    for other in (late(0.19, unseen=False), late(-0.19, unseen=True)):
+        assert other.unresolved_with == ()
+        assert other.says == "The data lag by 0.19 s. All logs show it."
 
 
 def test_a_weak_thruster_in_a_part_of_one_log_is_no_event_where_the_logs_bring_the_hull() -> None:
