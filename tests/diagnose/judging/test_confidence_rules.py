@@ -69,7 +69,7 @@ def on(kind: Kind, **figures: object) -> Context:
 
 def test_every_rule_has_a_name_a_line_and_its_unit() -> None:
     names = [one.name for one in RULES]
-    assert len(names) == len(set(names)) == 27
+    assert len(names) == len(set(names)) == 28
     for one in RULES:
         assert one.about.endswith((".", ":", ",")) or one.about, one.name
         assert (one.threshold is None) == (one.unit == ""), one.name
@@ -474,14 +474,14 @@ def test_a_delay_after_orders_alone_may_be_that_of_thrusters() -> None:
         return made
 
     unresolved = late(0.19, unseen=True)
-    assert unresolved.unresolved_with == ("thruster_lag",)
+    assert unresolved.unresolved_with == ("current", "thruster_lag")
     assert unresolved.says == (
         "The motion lags the actuators' orders by 0.19 s: thrusters follow them late, or the navigation's data are late. All "
         "logs show it."
     )
     # Feedback is of what acted, and nothing moves before it is pushed.
     for other in (late(0.19, unseen=False), late(-0.19, unseen=True)):
-        assert other.unresolved_with == ()
+        assert other.unresolved_with == ("current",)
         assert other.says == "The data lag by 0.19 s. All logs show it."
 
 
