@@ -110,7 +110,7 @@ def test_neighbouring_values_of_a_coarse_sensor_are_not_alike() -> None:
     one = dict(zip(("x", "y"), 0.1 * np.cumsum(steps, axis=1), strict=True))
     beside = {name: values + 0.1 for name, values in one.items()}
     assert same_recording(recording(**one), recording(**one))
-    assert not same_recording(recording(**one), recording(**{"x": beside["x"], "y": one["y"] - 0.1}))
+    assert not same_recording(recording(**one), recording(x=beside["x"], y=one["y"] - 0.1))
 
 
 def test_velocities_show_a_copy_whose_positions_count_from_another_fix() -> None:
