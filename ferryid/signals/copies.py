@@ -18,7 +18,7 @@ from ferryid.errors import FerryIdError
 from ferryid.files import resolved
 from ferryid.signals.stream import Recording
 from ferryid.signals.thresholds import SIGNALS
-from ferryid.types import Floats, Ints
+from ferryid.types import Flags, Floats, Ints
 
 SAMPLES = 200
 """Places of a log, evenly spaced, that are looked for in the other."""
@@ -74,7 +74,10 @@ def same_recording(one: Recording, other: Recording) -> bool:
     """Return whether the samples of the pose, or of the velocity, of the shorter log are found in the other, in sequence.
 
     Values count as measured, not their times: a clock may have been set, and a begin cut off. Where the vessel lies still, or
-    a sensor repeats its value, nothing is compared.
+    a sensor repeats its value, nothing is compared. Positions and velocities may be rounded: they are alike within the coarser
+    of the quanta of both logs, the step of a signal near a value. Two logs of one sensor have one quantum, and have to be
+    equal; two trials never agree row by row to their noise. A heading alone has to be equal, as it turns through the same
+    values in many trials.
     """
     first, second = searchable([one, other])
     return first.same(second)
@@ -123,7 +126,10 @@ def _marked(hashes: Mapping[str, Ints], marks: Mapping[str, Any]) -> bool:
 
 def searchable(recordings: Sequence[Recording]) -> list[Searchable]:
     """Return the samples of recordings, each of which is to be compared with several: what is sorted is sorted once."""
-    return [Searchable(tuple(_Sequence(_signals(one, wanted)) for wanted in COMPARED)) for one in recordings]
+    return [
+        Searchable(tuple(_Sequence(_signals(one, wanted), wanted != (HEADING,)) for wanted in COMPARED))
+        for one in recordings
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,21 +139,29 @@ class Searchable:
     kinds: tuple[_Sequence, ...]
 
     def same(self, other: Searchable) -> bool:
-        """Return what `same_recording` does."""
+        """Return what `same_recording` does.
+
+        Velocities are looked at where positions are not alike, as these count from the first fix of a piece, and may have other
+        digits. A heading counts only where a log has neither.
+        """
+        compared = False
         for several in zip(self.kinds, other.kinds, strict=True):
-            if all(len(one.values) >= ROWS for one in several):
-                shorter, longer = sorted(several, key=lambda one: len(one.values))
-                share = shorter.found_share(longer)
-                if share is not None:
-                    return share >= SIGNALS.shared_samples
+            if any(len(one.values) < ROWS for one in several) or (compared and not several[0].rounded):
+                continue
+            shorter, longer = sorted(several, key=lambda one: len(one.values))
+            share = shorter.found_share(longer)
+            if share is not None and share >= SIGNALS.shared_samples:
+                return True
+            compared |= share is not None
         return False
 
 
 @dataclass(frozen=True, eq=False)
 class _Sequence:
-    """Samples of some signals in single precision, as formats differ, shape (n, signals)."""
+    """Samples of some signals in double precision, shape (n, signals); `rounded` where a copy may have fewer digits."""
 
     values: Floats
+    rounded: bool = False
 
     @cached_property
     def _order(self) -> Ints:
@@ -158,39 +172,146 @@ class _Sequence:
         return np.asarray(self.values[self._order, 0])
 
     @cached_property
-    def _pieces(self) -> Floats:
-        """Some `ROWS` in sequence that change, at places that are evenly spaced, shape (pieces, ROWS, signals)."""
+    def _places(self) -> Ints:
+        """Where some `ROWS` in sequence that change begin, evenly spaced."""
         places = np.unique(np.linspace(0, len(self.values) - ROWS, SAMPLES).astype(np.int64))
-        every = self.values[places[:, None] + np.arange(ROWS)]
-        alike = (every[:, :, None] == every[:, None]).all(axis=-1)
-        different = ROWS - np.tril(alike, -1).any(axis=2).sum(axis=1)
+        every = self.values.astype(np.float32)[places[:, None] + np.arange(ROWS)]
         # Steps of a coarse sensor, or of one that repeats its values, look alike by chance.
-        return np.asarray(every[different > ROWS // 2])
+        return np.asarray(places[_changing(every, np.zeros((len(every), every.shape[2])))])
+
+    @cached_property
+    def _pieces(self) -> Floats:
+        """The rows at `_places`, shape (pieces, ROWS, signals)."""
+        return np.asarray(self.values[self._places[:, None] + np.arange(ROWS)])
+
+    @cached_property
+    def _quanta(self) -> tuple[tuple[Floats, Floats], ...]:
+        """Of each signal some of its values in order, and its quantum from each of them to the next."""
+        return tuple(_quanta_of(column) for column in self.values.T)
+
+    @cached_property
+    def _own_quantum(self) -> Floats:
+        return self.quantum(self._pieces[:, 0])
+
+    @cached_property
+    def _single(self) -> Floats:
+        """The single precision of the pieces, shape (pieces, signals)."""
+        return np.asarray(SIGNALS.single_precision * np.abs(self._pieces).max(axis=1))
 
     @property
     def marks(self) -> Ints:
         """Hashes of at most `MARKS` pieces."""
         return _hashes(self._pieces[:: SAMPLES // MARKS])
 
+    def quantum(self, values: Floats) -> Floats:
+        """Return the quantum of the signals near some values of them, shape (k, signals)."""
+        found = np.zeros(values.shape)
+        if self.rounded:
+            for signal, (begin, step) in enumerate(self._quanta):
+                found[:, signal] = step[
+                    np.clip(np.searchsorted(begin, values[:, signal], "right") - 1, 0, len(step) - 1)
+                ]
+        return found
+
     def found_share(self, longer: _Sequence) -> float | None:
         """Return the share of pieces that another series has as well; None where this one hardly changes."""
         pieces = self._pieces
         if not len(pieces):
             return None
-        low, high = (np.searchsorted(longer._rising, pieces[:, 0, 0], side) for side in ("left", "right"))
-        found = 0
-        for k in np.flatnonzero(high > low).tolist():
-            tried = longer._order[low[k] : min(high[k], low[k] + TRIED)].tolist()
-            found += any(np.array_equal(longer.values[at : at + ROWS], pieces[k]) for at in tried)
-        return found / len(pieces)
+        share = float(self._found(longer, self._single).mean())
+        return share if share >= SIGNALS.shared_samples or not self.rounded else self._rounded_share(longer, share)
+
+    def _rounded_share(self, longer: _Sequence, share: float) -> float | None:
+        """Return the same where one may be rounded; None where too little changes by more than that.
+
+        `share` is the share of pieces that are alike to single precision, which is all where both have one quantum.
+        """
+        pieces, own, other = self._pieces, self._own_quantum, longer.quantum(self._pieces[:, 0])
+        quantum = np.maximum(own, other)
+        half = 0.5 * (1.0 + SIGNALS.quantum_slack) * quantum
+        if not ((half > self._single) & (np.abs(own - other) > SIGNALS.quantum_slack * quantum)).any():
+            return share
+        found = self._found(longer, np.maximum(half, self._single))
+        if not found.any():
+            return 0.0
+        # Steps of a few quanta are alike in many trials, and so is a straight way along an axis at one speed.
+        turning = (np.ptp(pieces, axis=1) > quantum).all(axis=1)
+        counts = turning & _changing(pieces, SIGNALS.rounded_quanta * quantum)
+        if counts.sum() < SIGNALS.shared_samples * len(pieces):
+            return None
+        return float((found & counts).sum() / counts.sum())
+
+    def _found(self, longer: _Sequence, near: Floats) -> Flags:
+        """Return which pieces another series has as well, within a distance of each signal, shape (pieces, signals)."""
+        pieces = self._pieces
+        first, away = pieces[:, 0, 0], near[:, 0]
+        low = np.searchsorted(longer._rising, first - away, "left")
+        count = np.minimum(np.searchsorted(longer._rising, first + away, "right") - low, TRIED)
+        piece = np.repeat(np.arange(len(pieces)), count)
+        at = longer._order[np.arange(len(piece)) - np.repeat(np.cumsum(count) - count, count) + np.repeat(low, count)]
+        whole = at <= len(longer.values) - ROWS
+        piece, at = piece[whole], at[whole]
+        for row in range(ROWS):
+            if not len(at):
+                break
+            alike = (np.abs(longer.values[at + row] - pieces[piece, row]) <= near[piece]).all(axis=1)
+            piece, at = piece[alike], at[alike]
+        found = np.zeros(len(pieces), dtype=np.bool_)
+        found[piece] = True
+        return found
+
+
+def _changing(pieces: Floats, near: Floats) -> Flags:
+    """Return which pieces, shape (k, ROWS, signals), have more than half of their rows unlike those before.
+
+    `near` is the distance up to which values are alike, shape (k, signals).
+    """
+    alike = (np.abs(pieces[:, :, None] - pieces[:, None]) <= near[:, None, None]).all(axis=-1)
+    different = ROWS - np.tril(alike, -1).any(axis=2).sum(axis=1)
+    return np.asarray(different > ROWS // 2)
+
+
+def _quanta_of(column: Floats) -> tuple[Floats, Floats]:
+    """Return values of a signal in order, and the quantum from each of them to the next.
+
+    That is the largest number of which all steps between neighbouring values are multiples. Of a signal that was rounded, to
+    decimals, to digits or to single precision, it is the step of that; of another it is next to nothing, however slowly and
+    steadily the signal changes.
+    """
+    values = np.sort(column)
+    steps = np.diff(values)
+    least = SIGNALS.least_quantum * max(abs(values[0]), abs(values[-1]))
+    changes = steps > least
+    if not changes.any():
+        return values[:1], np.zeros(1)
+    values, steps = values[:-1][changes], steps[changes]
+    size = min(SIGNALS.quantum_steps, len(steps))
+    several = steps[: len(steps) // size * size].reshape(-1, size)
+    # Small ones, but not the least alone: at a steady speed many are the same.
+    spread = np.linspace(0, size // 4, min(SIGNALS.divided_steps, size)).astype(np.int64)
+    return values[: several.size : size], _common_divisor(np.sort(several, axis=1)[:, spread], least)
+
+
+def _common_divisor(steps: Floats, least: float) -> Floats:
+    """Return the largest number of which the steps of a row are multiples, up to `least`, shape (k,); by Euclid."""
+    divisor = steps[:, 0]
+    for other in steps.T[1:]:
+        divided = other
+        while True:
+            rest = np.abs(divided - divisor * np.round(divided / divisor))
+            multiple = rest <= least
+            if multiple.all():
+                break
+            divided, divisor = np.where(multiple, divided, divisor), np.where(multiple, divisor, rest)
+    return np.where(divisor > SIGNALS.quantum_rests * least, divisor, 0.0)
 
 
 def _signals(recording: Recording, wanted: tuple[str, ...]) -> Floats:
     """Return signals of one topic, shape (n, signals); none without them all."""
     stream = next((each for each in recording.streams.values() if set(wanted) <= set(each.columns)), None)
     if stream is None:
-        return np.empty((0, len(wanted)), dtype=np.float32)
-    values = np.column_stack([stream.columns[name] for name in wanted]).astype(np.float32)
+        return np.empty((0, len(wanted)))
+    values = np.column_stack([stream.columns[name] for name in wanted]).astype(np.float64)
     return np.asarray(values[np.isfinite(values).all(axis=1)])
 
 

@@ -540,6 +540,48 @@ class SignalThresholds:
         "samples in sequence that another log has as well, above which both hold one recording",
         "convention: a tenth; no two recordings have eight changing samples in sequence alike",
     )
+    quantum_slack: float = threshold(
+        1e-3,
+        "of half a quantum",
+        "by which values may differ more than rounding makes them",
+        "convention: roundings of conversions are less, and values of one sensor differ by whole quanta",
+    )
+    rounded_quanta: float = threshold(
+        2.0,
+        "quanta",
+        "by which rows have to change to show that two logs are one, rounded",
+        "convention: more than one; neighbouring quanta are alike in many trials",
+    )
+    quantum_steps: int = threshold(
+        128,
+        "steps",
+        "between neighbouring values of a signal, of which its quantum near them is found",
+        "convention: many enough to be small, few enough that values rounded to digits have one quantum",
+    )
+    divided_steps: int = threshold(
+        8,
+        "steps",
+        "of the smallest quarter of these, whose common divisor the quantum is",
+        "derived: eight whole numbers at random have a common divisor once in 250 times",
+    )
+    least_quantum: float = threshold(
+        2.0**-30,
+        "of the largest value",
+        "least quantum that is found",
+        "derived: far below single precision, in which values may differ in any case, and far above roundings of double",
+    )
+    quantum_rests: float = threshold(
+        16.0,
+        "least quanta",
+        "up to which a common divisor is what is left of steps that have none",
+        "derived: of such steps it is between one and a few of them",
+    )
+    single_precision: float = threshold(
+        2.0**-23,
+        "of the value",
+        "by which values of two logs may differ in any case",
+        "derived: single precision, in which formats keep them",
+    )
     least_marks: int = threshold(
         2,
         "places of a training log",

@@ -17,7 +17,7 @@ from ferryid.simulate.check_scenario import vessel_of
 from ferryid.simulate.plant.beside import FACTORS
 from ferryid.simulate.scenario import Scenario, scenario_of
 from ferryid.vessel import parse_profile
-from ferryid.vessel.profile import Profile
+from ferryid.vessel.profile import Actuator, Profile
 
 VESSEL_KEYS = (
     ("true_hull",),
@@ -99,11 +99,33 @@ def sailed_by(scenario: Scenario, model: Model, conditions: str = "") -> Sailing
         raise FerryIdError(f"with {', '.join(_names(stored))} of {model.label}, {error}") from error
     return Sailing(
         changed,
-        replace(own, hull=replace_hull_coefficients(own.hull, hull_coefficients(model))),
+        replace(
+            own,
+            hull=replace_hull_coefficients(own.hull, hull_coefficients(model)),
+            actuators=_limited(own.actuators, expected.actuators),
+        ),
         tuple(f"the scenario's [{'.'.join(place)}] is set aside: the vessel is {model.label}" for place in aside),
         terms,
         "" if chosen is None else chosen.log,
     )
+
+
+def _limited(actuators: Sequence[Actuator], expected: Sequence[Actuator]) -> tuple[Actuator, ...]:
+    """Return the actuators of a model, those whose thrust curve has no end with the ends that the scenario's vessel has.
+
+    A recording needs none, while a simulated propeller does. A curve is the same one if it differs in nothing else.
+    """
+    ends = {one.name: one.thrust for one in expected}
+
+    def limited(one: Actuator) -> Actuator:
+        curve, other = one.thrust, ends.get(one.name)
+        if curve is None or other is None or all(isfinite(end) for end in curve.valid):
+            return one
+        low, high = (own if isfinite(own) else given for own, given in zip(curve.valid, other.valid, strict=True))
+        ended = replace(curve, valid=(low, high))
+        return replace(one, thrust=ended) if ended == replace(other, valid=(low, high)) else one
+
+    return tuple(limited(one) for one in actuators)
 
 
 def _conditions(model: Model, log: str) -> Conditions:

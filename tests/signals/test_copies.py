@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import cast
 
@@ -60,6 +61,64 @@ def test_another_format_rounds_the_values() -> None:
     whole = track(1)
     single = {name: values.astype(np.float32).astype(np.float64) for name, values in whole.items()}
     assert same_recording(recording(**whole), recording(**single))
+
+
+def to_digits(values: Floats, digits: int) -> Floats:
+    return np.array([float(f"{one:.{digits}g}") for one in values])
+
+
+@pytest.mark.parametrize(
+    "rounded",
+    [
+        lambda values: np.round(values, 5),
+        lambda values: np.round(values, 2),
+        lambda values: to_digits(values, 4),
+        lambda values: to_digits(values, 6),
+        lambda values: 0.003 * np.round(values / 0.003),
+    ],
+    ids=["5 decimals", "2 decimals", "4 digits", "6 digits", "steps of 3 mm"],
+)
+def test_a_copy_with_fewer_digits_is_the_same_recording(rounded: Callable[[Floats], Floats]) -> None:
+    whole, other = ({name: rounded(values) for name, values in track(seed).items()} for seed in (1, 2))
+    for piece in (whole, cut(whole, slice(300, 1500))):
+        assert same_recording(recording(**track(1)), recording(**piece))
+        assert same_recording(recording(**piece), recording(**track(1)))
+    assert not same_recording(recording(**track(1)), recording(**other))
+    assert not same_recording(recording(**whole), recording(**other))
+
+
+def test_a_manoeuvre_that_is_repeated_is_no_copy_of_one_with_fewer_digits() -> None:
+    t = 0.1 * np.arange(2000)
+    turn = {"x": 10.0 * np.sin(0.1 * t), "y": 10.0 * np.cos(0.1 * t)}
+    # The same circle but for what a receiver of the best kind is off.
+    noise = np.random.default_rng(5).normal(scale=0.003, size=(2, 2000))
+    again = {name: values + off for (name, values), off in zip(turn.items(), noise, strict=True)}
+    for decimals in (2, 3, 4, 5):
+        rounded = {name: np.round(values, decimals) for name, values in again.items()}
+        assert not same_recording(recording(**turn), recording(**rounded))
+
+
+def test_a_straight_way_at_one_speed_is_no_copy_of_another() -> None:
+    # In steps of 5 cm exactly, as of a simulator, its quantum looks like 5 cm.
+    one = {"x": 0.05 * np.arange(500.0), "y": np.zeros(500)}
+    other = {"x": 0.0171 + 0.05003 * np.arange(500.0), "y": np.zeros(500)}
+    assert not same_recording(recording(**one), recording(**other))
+
+
+def test_neighbouring_values_of_a_coarse_sensor_are_not_alike() -> None:
+    steps = np.random.default_rng(7).integers(1, 3, size=(2, 500))
+    one = dict(zip(("x", "y"), 0.1 * np.cumsum(steps, axis=1), strict=True))
+    beside = {name: values + 0.1 for name, values in one.items()}
+    assert same_recording(recording(**one), recording(**one))
+    assert not same_recording(recording(**one), recording(x=beside["x"], y=one["y"] - 0.1))
+
+
+def test_velocities_show_a_copy_whose_positions_count_from_another_fix() -> None:
+    whole = {**track(1), "u": track(3)["x"], "v": track(3)["y"]}
+    moved = {**whole, "x": whole["x"] - 7.3, "y": whole["y"] + 2.1}
+    assert same_recording(
+        recording(**whole), recording(**{name: np.round(values, 4) for name, values in moved.items()})
+    )
 
 
 def test_another_trial_is_not() -> None:

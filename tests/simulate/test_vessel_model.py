@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -184,3 +185,33 @@ def test_what_cannot_be_sailed_is_told() -> None:
     light = hull_alone(conditions=(Conditions("trial", HERE, (stored("payload", mass=-200.0, x=0.5),)),))
     with pytest.raises(FerryIdError, match=r'with payload of boat@0, t[.]toml:.*"mass_kg" must be'):
         sailed_by(scenario, light, "trial")
+
+
+def without_limits(text: str) -> str:
+    """Return the ferry's profile with thrust curves that never end."""
+    return re.sub(
+        r'^kind = "polynomial"\ninput = "rpm"\ncoefficients = .*\nvalid = .*$',
+        'kind = "quadratic"\ninput = "rpm"\nahead = 8.0e-4\nastern = 8.0e-4',
+        text,
+        flags=re.MULTILINE,
+    )
+
+
+def test_a_model_without_limits_of_its_propellers_has_those_of_the_scenarios_vessel(tmp_path: Path) -> None:
+    model = hull_alone()
+    text = without_limits(model.profile_text)
+    model, limits = replace(model, profile_text=text), "valid = [-900.0, 900.0]"
+    scenario = parse_scenario(TRIAL.replace('"milliampere"', f'"{tmp_path / "own.toml"}"'), "t")
+    (tmp_path / "own.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(FerryIdError, match=r"no limit in its thrust curve\. Fix: name a profile in the scenario"):
+        simulate(scenario, 3, vessel=sailed_by(scenario, model).vessel)
+    (tmp_path / "own.toml").write_text(text.replace("astern = 8.0e-4", f"astern = 8.0e-4\n{limits}"), encoding="utf-8")
+    sailing = sailed_by(scenario, model)
+    assert [one.thrust.valid for one in sailing.vessel.actuators if one.thrust is not None] == [(-900.0, 900.0)] * 2
+    assert len(simulate(scenario, 3, vessel=sailing.vessel).truth.eta) > 0
+    # Those of another curve are not its own.
+    other = text.replace("astern = 8.0e-4", f"astern = 7.0e-4\n{limits}")
+    (tmp_path / "own.toml").write_text(other, encoding="utf-8")
+    assert all(
+        one.thrust is None or one.thrust.valid[1] == np.inf for one in sailed_by(scenario, model).vessel.actuators
+    )

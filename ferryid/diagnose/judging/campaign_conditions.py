@@ -215,6 +215,12 @@ class ConditionTest:
         common[campaign.means][self.rows], own[:, self.rows] = 0.0, 0.0
         return felt(self.fit, common, own)
 
+    def seen(self, i: int) -> float:
+        """Return the posterior of what a log has of it outside the contour through none at all."""
+        value, covariance = self.condition(i)
+        away = value - np.array([one.neutral for one in self.parameters])
+        return 1.0 - exp(-0.5 * float(away @ np.linalg.solve(covariance, away)))
+
     def value_doubt(self, i: int) -> str:
         """Return why what a log has of it is not credible, or not felt, as the end of a sentence; empty where it is."""
         value, covariance = self.condition(i)
@@ -418,10 +424,7 @@ def _finding(test: ConditionTest, i: int, tests: tuple[ConditionTest, ...]) -> F
         return None
     value, covariance = test.condition(i)
     parameters = test.parameters
-    neutral = np.array([one.neutral for one in parameters])
-    away = value - neutral
-    # The posterior outside the contour through none at all.
-    seen = 1.0 - exp(-0.5 * float(away @ np.linalg.solve(covariance, away)))
+    seen = test.seen(i)
     if seen <= JUDGING.hint_probability:
         return None
     estimates = estimates_of(parameters, value, covariance)
@@ -490,8 +493,8 @@ def _improvement(test: ConditionTest) -> Floats:
 def note(test: ConditionTest, place: Mapping[str, int]) -> str:
     """Return what was tested, in sentences; `place` is which of the logs of the fit each path is."""
     logs = len(place)
-    title, found = effects()[test.effect].title, "confirmed" if test.confirmed else "not confirmed"
-    have = sum(any(each.effect.id == test.effect for each in one.conditions) for one in test.fit.campaign.members)
+    title, found = effects()[test.effect].title, _confirmed_in(test) if test.confirmed else "not confirmed"
+    have = len(_logs_with(test))
     whose = "each log" if have == logs else f"{have} of {counted(logs, 'log')}"
     others = [f"a {effects()[one].title.lower()}" for one in test.beside]
     beside = f" beside {listed(others)}" if others else ""
@@ -502,6 +505,26 @@ def note(test: ConditionTest, place: Mapping[str, int]) -> str:
     for where, one in test.placebos.items():
         told += f"; over one on {where}, evidence {one.evidence:+.0f} nat, held out {_range(one.gain)}"
     return f"{told}.{_where_worse(test, place)}"
+
+
+def _confirmed_in(test: ConditionTest) -> str:
+    """Return in how many logs a condition that is confirmed over all of them is a finding, and in how many a hint, and why."""
+    seen = [i for i in _logs_with(test) if test.seen(i) > JUDGING.hint_probability]
+    doubts = [doubt for i in seen if (doubt := test.value_doubt(i))]
+    sure = len(seen) - len(doubts)
+    if sure and not doubts:
+        return "confirmed"
+    hints = f"a hint in {counted(len(doubts), 'log')}, as {listed(list(dict.fromkeys(doubts)), 'or')}" if doubts else ""
+    if sure:
+        return f"confirmed in {counted(sure, 'log')}, {hints}"
+    alone = hints or "no log distinguishes it from none"
+    return f"held-out stretches of all logs together are predicted better with it, but it is confirmed in none: {alone}"
+
+
+def _logs_with(test: ConditionTest) -> list[int]:
+    """Return the logs of the fit that may have a condition."""
+    members = test.fit.campaign.members
+    return [i for i, one in enumerate(members) if any(each.effect.id == test.effect for each in one.conditions)]
 
 
 def _where_worse(test: ConditionTest, place: Mapping[str, int]) -> str:

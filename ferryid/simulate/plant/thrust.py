@@ -72,7 +72,10 @@ def _curve(profile: Profile, actuator: Actuator) -> ThrustCurve:
     if not (isfinite(curve.valid[0]) and isfinite(curve.valid[1])):
         raise FerryIdError(
             f"{profile.name}: the simulator needs to know how fast {actuator.name} can turn, found no limit in its thrust "
-            f"curve. Fix: add valid = [lowest, highest] [{curve.input_unit}] to it"
+            f'curve. Fix: name a profile in the scenario (vessel = "FILE") that has valid = [lowest, highest] '
+            f"[{curve.input_unit}] below [actuator.thrust] of {actuator.name}, under the same name; ferryid vessel show "
+            f"{profile.name} --toml prints a bundled one to add it to. A model takes the limits from there, without another "
+            "diagnosis"
         )
     if curve.kind == "open_water" and "diameter_m" not in actuator.inflow:
         raise FerryIdError(

@@ -39,3 +39,32 @@ def test_a_log_of_several_stretches_knows_its_own() -> None:
 @pytest.mark.parametrize("high", [0.0, 5.0])
 def test_what_may_be_no_worse_has_no_more_to_tell(high: float) -> None:
     assert "predicted worse" not in told((10.0, 20.0, 90.0), high)
+
+
+@pytest.mark.parametrize(
+    ("doubts", "expected"),
+    [
+        ({0: "", 1: ""}, "confirmed"),
+        ({0: "", 1: "it is small"}, "confirmed in 1 log, a hint in 1 log, as it is small"),
+        ({0: "it is small", 1: "it is small"}, "it is confirmed in none: a hint in 2 logs, as it is small"),
+        ({}, "it is confirmed in none: no log distinguishes it from none"),
+    ],
+)
+def test_what_all_logs_confirm_is_said_to_be_a_hint_in_those_where_it_is_one(
+    doubts: dict[int, str], expected: str
+) -> None:
+    current = SimpleNamespace(effect=effects()["current"])
+    campaign = SimpleNamespace(members=[SimpleNamespace(conditions=[current])] * 2, conditions=[current])
+    test = SimpleNamespace(
+        effect="current",
+        fit=SimpleNamespace(campaign=campaign),
+        beside=(),
+        confirmed=True,
+        seen=lambda i: 0.9 if i in doubts else 0.1,
+        value_doubt=doubts.get,
+        evidence=20.0,
+        gain=Gain(30.0, 10.0, 50.0),
+        placebos={},
+    )
+    text = note(cast("ConditionTest", test), PLACE)
+    assert f"{expected}. Over none" in text
