@@ -20,7 +20,7 @@ from ferryid.diagnose.judging.diagnosis import distinct
 from ferryid.effects.wording import MEANS_LITTLE, listed
 from ferryid.errors import FerryIdError
 from ferryid.files import name_of_log, resolved
-from ferryid.identify.engagement import pooled, unanswered_force, unengaged
+from ferryid.identify.engagement import odd_forces, pooled, unanswered_force
 from ferryid.log_warnings import ALIKE_LOGS
 from ferryid.models import Model
 from ferryid.side_by_side import over
@@ -184,11 +184,23 @@ def _unanswered(logs: Sequence[AveragedLog], profile: Profile) -> tuple[str, ...
     return (f"{whose} {what}. {MEANS_LITTLE}{also} Fix: see whether the actuators were engaged, or {remedy}",)
 
 
-def engaged(groups: Sequence[tuple[str, Gathered]], profile: Profile) -> tuple[Gathered, ...]:
-    """Return groups of logs of one vessel without those in which the actuators were not engaged, as logs of any group show.
+def _against(logs: Sequence[AveragedLog], reasons: Mapping[str, str]) -> tuple[str, ...]:
+    """Return a sentence on each log that is used, as there is no other, though its forces act otherwise than elsewhere."""
+    told = {one.path: one.screened.measured.response for one in logs if one.path in reasons}
+    return tuple(
+        f"{name_of_log(path)}: {what}. {MEANS_LITTLE} Fix: {remedy}"
+        for path, response in told.items()
+        if response is not None and not response.unanswered
+        for what, _, remedy in [reasons[path].partition(". Fix: ")]
+    )
 
-    A group of which none would be left keeps its logs, but for references. A sentence is on each log that is left out, and on
-    those that stay though the vessel hardly follows the applied force in them.
+
+def engaged(groups: Sequence[tuple[str, Gathered]], profile: Profile) -> tuple[Gathered, ...]:
+    """Return groups of logs of one vessel without those in which the actuators act otherwise than in the others of any group.
+
+    So it is where they were not engaged, or a sign changed. A group of which none would be left keeps its logs, but for
+    references. A sentence is on each log that is left out, and on those that stay though the vessel does not follow the applied
+    force in them.
 
     Parameters
     ----------
@@ -198,13 +210,13 @@ def engaged(groups: Sequence[tuple[str, Gathered]], profile: Profile) -> tuple[G
         The vessel.
     """
     responses = {one.path: one.screened.measured.response for _, group in groups for one in group.logs}
-    reasons, found = unengaged(responses, profile), list[Gathered]()
+    reasons, found = odd_forces(responses, profile), list[Gathered]()
     for whose, group in groups:
         here = {one.path: FerryIdError(f"{one.path}: {reasons[one.path]}") for one in group.logs if one.path in reasons}
         kept = tuple(one for one in group.logs if one.path not in here)
         # References are no more than help; what is diagnosed or compared is not empty.
         without = bool(kept) or whose == REFERENCES
-        left_out, logs = (left_out_of(whose, here), kept) if without else ((), group.logs)
+        left_out, logs = (left_out_of(whose, here), kept) if without else (_against(group.logs, reasons), group.logs)
         found.append(replace(group, logs=logs, notes=(*group.notes, *left_out, *_unanswered(logs, profile))))
     return tuple(found)
 

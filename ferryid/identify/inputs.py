@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError, with_sentence
-from ferryid.identify.engagement import unengaged
+from ferryid.identify.engagement import odd_forces
 from ferryid.identify.force_signs import ForceResponse, force_response
 from ferryid.identify.motion_data import prepared_data
 from ferryid.identify.settings import FitSettings
@@ -99,7 +99,7 @@ def usable_logs(
     whole: str = "fit",
     odd: OddLogs | None = None,
 ) -> UsableLogs:
-    """Read several logs as `read_logs` does, without those that a fit cannot use and those whose actuators were not engaged.
+    """Read several logs as `read_logs` does, without those that a fit cannot use and those of odd forces.
 
     Short ones that follow each other without a break are read as one (`ferryid.signals.contiguous`), unless one of these cannot
     be used. `whole` is what logs are left out of, as their sentences say; `odd` finds those of another vessel.
@@ -154,7 +154,7 @@ def _usable(
         return path, one
 
     found = list(usable(paths, examined, errors, lambda made: comparable(made[1].track)))
-    errors.update({path: FerryIdError(f"{path}: {why}") for path, why in unengaged(responses, profile).items()})
+    errors.update({path: FerryIdError(f"{path}: {why}") for path, why in odd_forces(responses, profile).items()})
     return [(path, one) for path, one in found if path not in errors]
 
 

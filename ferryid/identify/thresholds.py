@@ -176,6 +176,18 @@ class IdentifyThresholds:
         "by which an acceleration goes against the applied force before a fit is refused",
         "derived: one in a hundred by chance",
     )
+    odd_sigmas: float = threshold(
+        3.7,
+        "standard deviations",
+        "by which a log's vessel goes against the applied force, or does not follow it, before it is left out of several",
+        "derived: one in ten thousand by chance, as each of a hundred logs has three axes",
+    )
+    fewest_followed: int = threshold(
+        2,
+        "logs",
+        "in which the vessel clearly follows the force on an axis, from which another that does not is left out",
+        "convention: of two logs that disagree neither is known to be right",
+    )
     opposite: float = threshold(
         0.2,
         "of what the base model expects",

@@ -324,6 +324,28 @@ def test_a_log_by_itself_comes_with_what_explains_that_its_force_has_no_answer(
     assert engaged([(CAMPAIGN, Gathered(logs[:1]))], FERRY) == (Gathered(logs[:1]),)
 
 
+def mirrored(log: AveragedLog) -> AveragedLog:
+    """Return a log in which the yaw moment turns the vessel the other way."""
+    way, reach = np.array([0.9, 0.9, -0.9]), np.full(3, 0.05)
+    response = ForceResponse(way, reach, np.full(3, 2.3), np.ones(3, dtype=bool), np.ones(3))
+    return replace(log, screened=replace(log.screened, measured=replace(log.screened.measured, response=response)))
+
+
+def test_logs_whose_forces_act_the_other_way_are_left_out(days: list[str], logs: tuple[AveragedLog, ...]) -> None:
+    (found,) = engaged([(CAMPAIGN, Gathered((logs[0], mirrored(logs[1]), logs[2])))], FERRY)
+    assert paths(found.logs) == [days[0], days[2]]
+    (note,) = found.notes
+    said = "the yaw moment of the actuators turns the vessel the other way (-0.9 ± 0.05 times what the base model expects; "
+    assert note.startswith(f"Left out of the campaign: {days[1]}: {said}")
+    assert "in the 2 other logs). Fix: see whether" in note
+    # What is compared stays, as there is nothing else.
+    _, alone = engaged([(CAMPAIGN, Gathered((logs[0], logs[2]))), (CAMPAIGN, Gathered((mirrored(logs[1]),)))], FERRY)
+    assert paths(alone.logs) == [days[1]]
+    (note,) = alone.notes
+    assert note.startswith(f"{Path(days[1]).name}: {said}")
+    assert f"{MEANS_LITTLE} Fix: see whether" in note
+
+
 def unsure(log: AveragedLog, value: float) -> AveragedLog:
     """Return a log that is too short to show how its vessel follows the applied force."""
     response = ForceResponse(np.full(3, value), np.full(3, 0.1), np.full(3, 4.0), np.ones(3, dtype=bool), np.ones(3))

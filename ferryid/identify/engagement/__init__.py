@@ -1,6 +1,15 @@
-"""Whether the actuators were engaged in a log: the vessel follows the applied force there as far as an inertia lets it."""
+"""Whether the actuators act in a log as in the others, and at all: the vessel follows the force as its inertia lets it."""
 
+from ferryid.identify.engagement.odd_responses import odd_forces, unlike_others
 from ferryid.identify.engagement.responses import force_response_of, pooled, unanswered_force, unengaged
 from ferryid.identify.force_signs import ForceResponse
 
-__all__ = ["ForceResponse", "force_response_of", "pooled", "unanswered_force", "unengaged"]
+__all__ = [
+    "ForceResponse",
+    "force_response_of",
+    "odd_forces",
+    "pooled",
+    "unanswered_force",
+    "unengaged",
+    "unlike_others",
+]
