@@ -60,6 +60,7 @@ def ended(seed: int, monkeypatch: pytest.MonkeyPatch) -> tuple[int, bool]:
     for name, stub in {
         "_fallen": fallen,
         "_standings": standings,
+        "_sizes": lambda _problem, _kept, _index: "",
         "with_both": with_both,
         "without": without,
         "prune": lambda _problem, kept: kept,
