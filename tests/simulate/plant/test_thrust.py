@@ -72,7 +72,7 @@ def test_direct_force_is_its_own_order():
     ("changes", "said"),
     [
         ({"thrust": None}, "thrust curve of thruster1"),
-        ({"thrust": replace(CURVE, valid=(-np.inf, np.inf))}, "add valid"),
+        ({"thrust": replace(CURVE, valid=(-np.inf, np.inf))}, r"has valid = \[lowest, highest\]"),
         ({"thrust": replace(CURVE, kind="open_water", input_unit="rps", table=((0.0, 1.0), (0.3, 0.0)))}, "diameter_m"),
     ],
 )
