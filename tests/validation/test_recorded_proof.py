@@ -195,6 +195,9 @@ def test_what_counts_is_the_difference() -> None:
         *(NotMade("a", "payload", size, "payload: 4 % of the rows cannot express it, as so.") for size in (0.3, 0.5)),
         NotMade("a", "thruster_lag", 0.7, "thruster_lag of 0.7 s was not made in a: by the record another one."),
         NotMade("b", "", 0.0, "b.bag: too short. Fix: none"),
+        NotMade(
+            "b", "wind and payload", 0.0, "wind and payload cannot be concealed in b: together, wind is beyond 20 m/s."
+        ),
     ]
     scores = score_recorded(results, lacking)
     assert scores.runs == 6
@@ -218,7 +221,7 @@ def test_what_counts_is_the_difference() -> None:
         "- a: wind (no areas); payload of 0.3 and 0.5 share of the mass (more than 2 % of the rows cannot express it, as so);"
         " thruster_lag of 0.7 s (by the record another one)." in text
     )
-    assert "- b: b.bag: too short. Fix: none." in text
+    assert "- b: b.bag: too short. Fix: none; wind and payload (together, wind is beyond 20 m/s)." in text
     assert "| Sensors | 60.0 % (3/5)" in text
     assert "2 time_delay" in text
 

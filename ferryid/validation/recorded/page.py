@@ -206,8 +206,9 @@ def _lacking(reason: str, some: Sequence[NotMade]) -> str:
     parts = []
     for effect in dict.fromkeys(one.effect for one in some):
         sizes = [one.size for one in some if one.effect == effect and one.size]
-        unit = concealments()[effect].unit
-        parts.append(f"{effect} of {' and '.join(f'{size:.3g}' for size in sizes)} {unit}" if sizes else effect)
+        # Two effects together have no size.
+        of = f" of {' and '.join(f'{size:.3g}' for size in sizes)} {concealments()[effect].unit}" if sizes else ""
+        parts.append(f"{effect}{of}")
     return f"{', '.join(parts)} ({reason})"
 
 
