@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ferryid.counts import counted
+from ferryid.effects.wording import listed
 from ferryid.files import write_text
 from ferryid.validation.case_sampling import SEA_LOGS
 from ferryid.validation.name_scores import Share
@@ -67,7 +68,7 @@ def joint_page(
         "# Proof: what `ferryid diagnose` finds of effects that were concealed from it",
         "",
         *(f"- **{question}** {'; '.join(said)}." for question, said in answered),
-        f"- **How could I check it?** {CHECK}",
+        f"- **How could I check it?** {CHECK}; {_repeat(simulated, sea, real)} repeat the draws, another `SEED` draws others.",
         "",
         SIDE_BY_SIDE,
         *_rows(parts),
@@ -77,6 +78,17 @@ def joint_page(
     for one in parts:
         lines += ["", re.sub(r"^#", "##", one.text, flags=re.MULTILINE).strip()]
     return "\n".join(lines) + "\n"
+
+
+def _repeat(*results: Result | None) -> str:
+    """Return the targets that draw the same again."""
+    targets = zip(("proof", "proof-sea", "proof-real"), results, strict=True)
+    made = [
+        f"`make {target} SEED={result['seed']} RUNS={result['settings']['runs']:g}`"
+        for target, result in targets
+        if result is not None
+    ]
+    return listed(made)
 
 
 @dataclass(frozen=True)
@@ -190,8 +202,7 @@ ON_TRIALS = (
 ON_CAMPAIGNS = "the same plant in logs of minutes, no hull model, a receiver that lags, gaps and an unsteady wind"
 CHECK = (
     "`ferryid prove --check reports/proof`, `--check reports/proof-sea` and `--check reports/proof-real` hash the published "
-    "answers against the commitments made before the first diagnosis; `make proof proof-sea proof-real` repeats the draws, "
-    "`SEED=N` draws others."
+    "answers against the commitments made before the first diagnosis"
 )
 SIDE_BY_SIDE = """## Side by side
 
