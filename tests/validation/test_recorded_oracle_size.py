@@ -197,6 +197,12 @@ def test_two_effects_are_concealed_one_after_the_other(monkeypatch: pytest.Monke
     assert "cannot be concealed in ferry: together, time_delay of 4 times the oracle's size is beyond 2 s." in one.why
 
 
+def test_a_size_that_is_drawn_again_is_the_same() -> None:
+    # What two processes made of one recording.
+    assert case_sampling._repeatable(0.3531394215793495) == case_sampling._repeatable(0.353139421579354) == 0.35313942
+    assert case_sampling._repeatable(np.inf) == np.inf
+
+
 def test_what_forces_alone_show_is_not_concealed_where_the_vessel_does_not_follow_them(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

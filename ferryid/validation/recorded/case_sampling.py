@@ -281,7 +281,7 @@ def _of_pair(
         truths, beyond = list[Truth](), ""
         for one in both:
             truth_of, most = _truth_of(logs, one, rng, None), one.sizes(logs[0])[1]
-            size = IN_PAIRS * oracle_size(one, baselines(recording.logs, recording.vessel), truth_of)
+            size = IN_PAIRS * _repeatable(oracle_size(one, baselines(recording.logs, recording.vessel), truth_of))
             if size > most:
                 beyond = f"together, {one.id} of {IN_PAIRS:g} times the oracle's size is beyond {most:.3g} {one.unit}"
             truths.append(truth_of(min(size, most)))
@@ -302,6 +302,14 @@ def _of_pair(
         else:
             cases.append(replace(case, allowed=tuple(name for one in both for name in one.allowed)))
     return cases, lacking
+
+
+def _repeatable(size: float) -> float:
+    """Return a size in eight digits: the last ones differ from one process to the next, as sums of several threads do.
+
+    A run that goes on draws its cases again, and must draw those that it has committed itself to.
+    """
+    return float(f"{size:.8g}")
 
 
 def _truth_of(
@@ -331,14 +339,14 @@ def _drawn(
     truth_of = _truth_of(logs, one, rng, begin)
     before = baselines(recording.before, recording.vessel)
     known = sizes_in(one, baselines(recording.logs, recording.vessel), truth_of, before)
-    least = known.oracle
+    least, distinct = _repeatable(known.oracle), _repeatable(known.distinct)
     size, most = multiple * least, one.sizes(logs[0])[1]
     if size > most:
         seen = "an oracle sees none" if isinf(least) else f"an oracle needs {least:.3g} {one.unit}"
         text = f"{one.id} of {multiple:.2g} times the oracle's size was not made in {recording.name}: {seen},"
         return NotMade(recording.name, one.id, 0.0, f"{text} and sizes end at {most:.3g} {one.unit}.")
     case = _case(recording, logs, one.id, kind, rng, truth_of(size), None if later else level, size)
-    return replace(case, oracle_size=least, distinct_size=known.distinct, allowed=one.allowed)
+    return replace(case, oracle_size=least, distinct_size=distinct, allowed=one.allowed)
 
 
 def _case(
