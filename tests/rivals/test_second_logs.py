@@ -92,7 +92,9 @@ def test_free_runs_that_another_model_wins_are_put_down_to_starts_to_what_is_unn
 
 @pytest.mark.slow
 def test_free_runs_from_true_states_are_those_of_a_log_without_noise(tmp_path: Path) -> None:
-    quiet = replace(cases()[0], truths=(), conditions={"noise": 0.0}, hull_factors={})
+    # Noise shows in free runs where these err little otherwise, as on the path and with the seed of this case.
+    case = next(one for one in cases() if one.cell == "wrong base: wind")
+    quiet = replace(case, truths=(), conditions={"noise": 0.0}, hull_factors={})
     first, second = generate(quiet, tmp_path), generate(quiet, tmp_path / "second", transfer=True)
     profile = load_profile(first.profile)
     found = transfer(str(first.log), str(second.log), profile, tmp_path / "out", diagnosed=None, rivals={})

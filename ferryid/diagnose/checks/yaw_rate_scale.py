@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from math import nan
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from ferryid.diagnose.checks.check import Check, Lasting, SensorFinding, mapped, rescaled
 from ferryid.diagnose.checks.heading_rounding import rounding_steps
@@ -65,7 +65,7 @@ class Rates:
     @property
     def doubt(self) -> str:
         """Why it may be no factor, as the end of a sentence; empty where nineteen in twenty turns are on one side of 1."""
-        if not self.scatter * float(norm.ppf(CHECKS.turns_alike)) > abs(self.solution.values[0] - 1.0):
+        if not self.scatter * float(ndtri(CHECKS.turns_alike)) > abs(self.solution.values[0] - 1.0):
             return ""
         return f"it scatters by {self.scatter:.3f} from turn to turn, as no gyro's does: the heading may err in turns"
 
