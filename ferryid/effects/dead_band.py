@@ -109,7 +109,11 @@ def _order(actuator: Actuator, push: Floats) -> Floats:
 
 def cannot(measurements: Measurements) -> str:
     """Return why the measurements cannot show it of any actuator."""
-    return "" if instances(measurements.profile) else "no actuator has a thrust curve over speed alone, with an end"
+    return (
+        ""
+        if instances(measurements.profile)
+        else "no actuator has a thrust curve over speed alone whose limits are stated (valid)"
+    )
 
 
 def cannot_be_of(measurements: Measurements, instance: str | None) -> str:

@@ -79,7 +79,9 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
 def cannot(measurements: Measurements) -> str:
     """Return why the measurements cannot show it of any actuator."""
     return (
-        "" if instances(measurements.profile) else "no actuator has a thrust curve with an end and an unmeasured force"
+        ""
+        if instances(measurements.profile)
+        else "no actuator of unmeasured force has a thrust curve whose limits are stated (valid)"
     )
 
 

@@ -107,7 +107,9 @@ def constants(profile: Profile, thruster: str) -> tuple[float, ...]:
 def cannot(measurements: Measurements) -> str:
     """Return why the measurements cannot show it of any actuator."""
     return (
-        "" if instances(measurements.profile) else "no actuator has a thrust curve with an end and an unmeasured force"
+        ""
+        if instances(measurements.profile)
+        else "no actuator of unmeasured force has a thrust curve whose limits are stated (valid)"
     )
 
 

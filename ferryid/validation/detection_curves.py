@@ -11,30 +11,24 @@ end with the slope. The slope therefore has a gamma prior of shape 2 and scale 3
 threshold of 4 to 40 nats goes from 1 in 20 to 19 in 20 within a factor of 1.5 to 3 of size, which is a slope of 5 to 14; the
 prior's middle 90 % reach from 1 to 14.
 
-What makes a curve steep is the same for all effects: how the evidence grows with a size, and how logs scatter. Where many
-effects were tried, their slopes are therefore taken as drawn from one gamma distribution, whose mean and shape are those of
-the greatest marginal likelihood over all effects (empirical Bayes, Carlin and Louis 2000): ten runs of one effect hardly
-determine a slope, and the size that is named 19 times in 20 lies where the curve is extrapolated by it.
-
 References
 ----------
-Carlin and Louis (2000), Bayes and empirical Bayes methods for data analysis, 2nd ed., chapter 3. Chung, Rabe-Hesketh, Dorie,
-Gelman and Liu (2013), A nondegenerate penalized likelihood estimator for variance parameters in multilevel models,
-Psychometrika 78. Venzon and Moolgavkar (1988), A method for computing profile-likelihood-based confidence intervals, Applied
-Statistics 37.
+Chung, Rabe-Hesketh, Dorie, Gelman and Liu (2013), A nondegenerate penalized likelihood estimator for variance parameters in
+multilevel models, Psychometrika 78. Venzon and Moolgavkar (1988), A method for computing profile-likelihood-based confidence
+intervals, Applied Statistics 37.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import exp, inf, isfinite, isnan, log
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import expit, logsumexp
-from scipy.stats import chi2, gamma, norm
+from scipy.special import expit
+from scipy.stats import chi2, norm
 
 from ferryid.errors import FerryIdError
 from ferryid.json_record import Record
@@ -44,6 +38,8 @@ RELIABLE = 0.95
 """Share that is named reliably: 19 in 20."""
 LEVEL = 0.95
 """Of the intervals."""
+SHAPE, SCALE = 2.0, 3.0
+"""Of the gamma prior of the slope."""
 SLOPES = (0.2, 100.0)
 """Least and greatest slope that is tried."""
 BEYOND = 5.0
@@ -58,34 +54,6 @@ DRAWS = 400
 """Of a parametric bootstrap."""
 TOGETHER = np.linspace(0.0, 0.95, 20)
 """Correlations that are tried between what is named by two on the same logs."""
-
-
-@dataclass(frozen=True)
-class Slopes:
-    """Gamma distribution of the slopes of detection curves.
-
-    Attributes
-    ----------
-    shape, scale
-        Their mean is the product.
-    """
-
-    shape: float = 2.0
-    scale: float = 3.0
-
-    def log_density(self, slope: Floats) -> Floats:
-        """Return the logarithm of the density of slopes, shape (s,)."""
-        return np.asarray(gamma.logpdf(slope, self.shape, scale=self.scale))
-
-
-USUAL = Slopes()
-"""Of a curve by itself."""
-SHAPES = np.geomspace(USUAL.shape, 16.0, 13)
-"""Shapes that are tried for the slopes of many curves: their standard deviation is a quarter of the mean or more."""
-MEANS = np.geomspace(1.0, 36.0, 37)
-"""Means that are tried for them."""
-LIKE_USUAL = 0.7
-"""How far the shape and the mean of many curves are expected from the usual ones, standard deviations of their logarithms."""
 
 
 @dataclass(frozen=True)
@@ -191,10 +159,10 @@ class _Grid:
     prior: Floats
 
     @classmethod
-    def over(cls, x: Floats, place: Floats, slope: Floats, prior: Slopes | None) -> _Grid:
+    def over(cls, x: Floats, place: Floats, slope: Floats, *, prior: bool) -> _Grid:
         """Return the grid of places and slopes for runs of sizes with these logarithms, shape (n,)."""
         logit = log(RELIABLE / (1.0 - RELIABLE)) + slope[None, :, None] * (x[None, None] - place[:, None, None])
-        prior_log = np.zeros_like(slope) if prior is None else prior.log_density(slope)
+        prior_log = (SHAPE - 1.0) * np.log(slope) - slope / SCALE if prior else np.zeros_like(slope)
         # log(1 + exp(-|logit|)) once for both, without overflow.
         small = np.log1p(np.exp(-np.abs(logit)))
         return cls(place, slope, np.minimum(logit, 0.0) - small, -np.maximum(logit, 0.0) - small, prior_log)
@@ -230,7 +198,7 @@ class _Grid:
         return np.asarray((terms.reshape(-1, 3) @ sums).reshape(*nobody.shape, -1).max(axis=1))
 
 
-def curve(sizes: Sequence[float], named: Sequence[bool], prior: Slopes | None = USUAL) -> Curve:
+def curve(sizes: Sequence[float], named: Sequence[bool], *, prior: bool = True) -> Curve:
     """Return the detection curve of some runs.
 
     Parameters
@@ -240,7 +208,7 @@ def curve(sizes: Sequence[float], named: Sequence[bool], prior: Slopes | None = 
     named
         Whether it was named.
     prior
-        Of the slope; None leaves it out, for comparison with others: it is then at most 100.
+        False leaves out the prior of the slope, for comparison with others; it is then at most 100.
 
     Raises
     ------
@@ -248,16 +216,16 @@ def curve(sizes: Sequence[float], named: Sequence[bool], prior: Slopes | None = 
         For sizes that are not positive, and for none.
     """
     x, y = _checked(sizes, named)
-    grid = _grid(x, FINE, prior)
+    grid = _grid(x, FINE, prior=prior)
     profile, at = grid.profile(y[:, None])
     best, slope = float(_top(grid, profile)[0]), float(grid.slope[at[_highest(profile)[0], 0]])
     top = float(profile.max())
     if isfinite(best):
         k = int(_highest(profile)[0])
-        near, slopes = _closer(x, y, grid, at, (max(k - 1, 0), k + 1), prior)
+        near, slopes = _closer(x, y, grid, at, (max(k - 1, 0), k + 1), prior=prior)
         j = int(near[1].argmax())
         best, slope, top = float(near[0][j]), float(slopes[j]), max(top, float(near[1][j]))
-    low, high = _interval(x, y, grid, profile[:, 0], at, top, prior)
+    low, high = _interval(x, y, grid, profile[:, 0], at, top, prior=prior)
     least, most = float(x.min()), float(x.max())
     bound = "never" if best > most + MARGIN else "always" if best < least - MARGIN else ""
     return Curve(
@@ -274,51 +242,7 @@ def curve(sizes: Sequence[float], named: Sequence[bool], prior: Slopes | None = 
     )
 
 
-def common_slopes(every: Iterable[tuple[Sequence[float], Sequence[bool]]]) -> Slopes:
-    """Return the distribution of the slopes of many curves, by their marginal likelihood; the usual one where they show none.
-
-    Parameters
-    ----------
-    every
-        Sizes and answers of each, as of `curve`.
-
-    Raises
-    ------
-    FerryIdError
-        As of `curve`.
-    """
-    slope: Floats = np.geomspace(*SLOPES, FINE[1])
-    likelihoods = []
-    for sizes, named in every:
-        x, y = _checked(sizes, named)
-        # Of a slope, wherever the half are named: sizes that are always or never named show next to nothing of it.
-        half: Floats = np.linspace(x.min() - BEYOND, x.max() + BEYOND, COARSE[0])
-        logit = slope[None, :, None] * (x - half[:, None])[:, None, :]
-        likelihoods.append(logsumexp(-np.logaddexp(0.0, np.where(y > 0.5, -logit, logit)).sum(axis=2), axis=0))
-    if not likelihoods:
-        return USUAL
-    tried = [(float(shape), float(mean)) for shape in SHAPES for mean in MEANS]
-    usual = np.log((USUAL.shape, USUAL.shape * USUAL.scale))
-    best = max(
-        tried,
-        key=lambda one: float(
-            # The slopes of the grid are evenly spaced by their logarithm.
-            logsumexp(
-                np.stack(likelihoods) + Slopes(one[0], one[1] / one[0]).log_density(slope) + np.log(slope), axis=1
-            ).sum()
-            - 0.5 * (((np.log(one) - usual) / LIKE_USUAL) ** 2).sum()
-        ),
-    )
-    return Slopes(best[0], best[1] / best[0])
-
-
-def ratio(
-    sizes: Sequence[float],
-    one: Sequence[bool],
-    other: Sequence[bool],
-    seed: int = 0,
-    priors: tuple[Slopes, Slopes] = (USUAL, USUAL),
-) -> Ratio:
+def ratio(sizes: Sequence[float], one: Sequence[bool], other: Sequence[bool], seed: int = 0) -> Ratio:
     """Return the size that one names reliably over the size that another does, who saw the same logs.
 
     What both name of a log is resampled by their curves, with the correlation that the logs show: a log that is
@@ -332,8 +256,6 @@ def ratio(
         Whether each of them named it.
     seed
         Of the draws.
-    priors
-        Of the slopes of both.
 
     Raises
     ------
@@ -341,12 +263,10 @@ def ratio(
         For sizes that are not positive, and for none.
     """
     (x, a), (_, b) = _checked(sizes, one), _checked(sizes, other)
-    grids = [_grid(x, COARSE, prior) for prior in priors]
-    shares = [_share(grid, made, x) for grid, made in zip(grids, (a, b), strict=True)]
+    grid = _grid(x, COARSE)
+    shares = [_share(grid, made, x) for made in (a, b)]
     value = None
-    sizes_found = [
-        curve(sizes, [bool(flag) for flag in made], prior).size for made, prior in zip((a, b), priors, strict=True)
-    ]
+    sizes_found = [curve(sizes, [bool(flag) for flag in made]).size for made in (a, b)]
     if sizes_found[0] is not None and sizes_found[1] is not None:
         value = sizes_found[0] / sizes_found[1]
     rho = _correlation(shares, (a > 0.5, b > 0.5))
@@ -357,7 +277,7 @@ def ratio(
         (chance < norm.ppf(share)[:, None]).astype(np.float64)
         for chance, share in zip((first, second), shares, strict=True)
     ]
-    tops = [_top(grid, grid.profile_of_many(x, named)) for grid, named in zip(grids, drawn, strict=True)]
+    tops = [_top(grid, grid.profile_of_many(x, named)) for named in drawn]
     least, most = float(x.min()) - MARGIN, float(x.max()) + MARGIN
     lows = [np.where(top > most, most, np.where(top < least, -inf, top)) for top in tops]
     highs = [np.where(top > most, inf, np.where(top < least, least, top)) for top in tops]
@@ -378,9 +298,9 @@ def _checked(sizes: Sequence[float], named: Sequence[bool]) -> tuple[Floats, Flo
     return np.log(size), np.asarray(named, dtype=np.float64)
 
 
-def _grid(x: Floats, points: tuple[int, int], prior: Slopes | None) -> _Grid:
+def _grid(x: Floats, points: tuple[int, int], *, prior: bool = True) -> _Grid:
     place: Floats = np.linspace(x.min() - BEYOND, x.max() + BEYOND, points[0])
-    return _Grid.over(x, place, np.geomspace(*SLOPES, points[1]), prior)
+    return _Grid.over(x, place, np.geomspace(*SLOPES, points[1]), prior=prior)
 
 
 def _highest(profile: Floats) -> NDArray[np.int64]:
@@ -401,7 +321,7 @@ def _top(grid: _Grid, profile: Floats) -> Floats:
 
 
 def _interval(
-    x: Floats, y: Floats, grid: _Grid, profile: Floats, at: NDArray[np.int64], top: float, prior: Slopes | None
+    x: Floats, y: Floats, grid: _Grid, profile: Floats, at: NDArray[np.int64], top: float, *, prior: bool
 ) -> tuple[float, float]:
     """Return the 95 % interval of a place; infinite where the profile does not fall far enough below its top."""
     level = top - 0.5 * float(chi2.ppf(LEVEL, 1))
@@ -409,23 +329,23 @@ def _interval(
     a, b = int(inside[0]), int(inside[-1])
     low, high = -inf, inf
     if a > 0:
-        (place, rising), _ = _closer(x, y, grid, at, (a - 1, a), prior)
+        (place, rising), _ = _closer(x, y, grid, at, (a - 1, a), prior=prior)
         low = float(np.interp(level, rising, place))
     if b < len(profile) - 1:
-        (place, falling), _ = _closer(x, y, grid, at, (b, b + 1), prior)
+        (place, falling), _ = _closer(x, y, grid, at, (b, b + 1), prior=prior)
         high = float(np.interp(-level, -falling, place))
     return low, high
 
 
 def _closer(
-    x: Floats, y: Floats, grid: _Grid, at: NDArray[np.int64], between: tuple[int, int], prior: Slopes | None
+    x: Floats, y: Floats, grid: _Grid, at: NDArray[np.int64], between: tuple[int, int], *, prior: bool
 ) -> tuple[tuple[Floats, Floats], Floats]:
     """Return places between two of a grid with the profile there, and the slopes that belong to it, on a finer grid."""
     growth = grid.slope[1] / grid.slope[0]
     ends = grid.slope[[int(at[k, 0]) for k in between]]
     place: Floats = np.linspace(grid.place[between[0]], grid.place[between[1]], CLOSER)
     slope = np.geomspace(float(ends.min()) / growth, float(ends.max()) * growth, CLOSER)
-    fine = _Grid.over(x, place, slope, prior)
+    fine = _Grid.over(x, place, slope, prior=prior)
     profile, steep = fine.profile(y[:, None])
     return (place, profile[:, 0]), slope[steep[:, 0]]
 

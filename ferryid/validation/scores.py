@@ -10,7 +10,7 @@ from math import nan
 import numpy as np
 
 from ferryid.json_record import Record
-from ferryid.validation.detection_curves import Curve, Ratio, Slopes, common_slopes, curve, ratio
+from ferryid.validation.detection_curves import Curve, Ratio, curve, ratio
 from ferryid.validation.estimate_errors import EstimateErrors, estimate_errors
 from ferryid.validation.name_scores import (
     Cell,
@@ -185,34 +185,10 @@ def detections(results: Sequence[CaseResult], thresholds: Mapping[str, float]) -
     for result in results:
         if result.case.level is not None and result.case.size > 0.0 and result.truths:
             by_cell.setdefault(result.case.cell, []).append(result)
-    answers = [_answers(cell, some, thresholds) for cell, some in by_cell.items()]
-    priors = (
-        common_slopes((one.sizes, one.blind_named) for one in answers),
-        common_slopes((one.oracle_sizes, one.oracle_named) for one in answers if one.oracle_sizes),
-    )
-    return tuple(_detection(one, priors) for one in answers)
+    return tuple(_detection(cell, some, thresholds) for cell, some in by_cell.items())
 
 
-@dataclass(frozen=True)
-class _Answers:
-    """What was named of the logs of a cell, as in `Detection`."""
-
-    cell: str
-    effect: str
-    threshold: float
-    sizes: tuple[float, ...]
-    blind_named: tuple[bool, ...]
-    seen: tuple[int, ...]
-    oracle_named: tuple[bool, ...]
-    instead: Mapping[str, int]
-
-    @property
-    def oracle_sizes(self) -> tuple[float, ...]:
-        """Of the runs that the oracle saw."""
-        return tuple(self.sizes[k] for k in self.seen)
-
-
-def _answers(cell: str, results: Sequence[CaseResult], thresholds: Mapping[str, float]) -> _Answers:
+def _detection(cell: str, results: Sequence[CaseResult], thresholds: Mapping[str, float]) -> Detection:
     sizes, blind, by_oracle, least, lost = [], [], [], list[float](), Counter[str]()
     for result in results:
         # Beside a gust there is its wind: the cell is called after what its size is of.
@@ -227,32 +203,20 @@ def _answers(cell: str, results: Sequence[CaseResult], thresholds: Mapping[str, 
             lost[TOO_SMALL if one and one.idle else outcome_of_missed(result, own.key)] += 1
     truths = results[0].truths
     effect = next((one.effect for one in truths if one.effect == cell), truths[0].effect)
-    return _Answers(
+    seen = [k for k, answer in enumerate(by_oracle) if answer is not None]
+    seen_sizes, answers = [sizes[k] for k in seen], [bool(by_oracle[k]) for k in seen]
+    return Detection(
         cell,
         effect,
+        curve(sizes, blind),
+        curve(seen_sizes, answers) if seen else None,
         max(least, default=nan),
+        ratio(seen_sizes, [blind[k] for k in seen], answers) if seen else None,
         tuple(sizes),
         tuple(blind),
-        tuple(k for k, answer in enumerate(by_oracle) if answer is not None),
-        tuple(answer for answer in by_oracle if answer is not None),
+        tuple(seen_sizes),
+        tuple(answers),
         dict(lost.most_common()),
-    )
-
-
-def _detection(one: _Answers, priors: tuple[Slopes, Slopes]) -> Detection:
-    seen, by_oracle = one.oracle_sizes, one.oracle_named
-    return Detection(
-        one.cell,
-        one.effect,
-        curve(one.sizes, one.blind_named, priors[0]),
-        curve(seen, by_oracle, priors[1]) if seen else None,
-        one.threshold,
-        ratio(seen, [one.blind_named[k] for k in one.seen], by_oracle, priors=priors) if seen else None,
-        one.sizes,
-        one.blind_named,
-        seen,
-        by_oracle,
-        one.instead,
     )
 
 

@@ -11,7 +11,7 @@ from scipy.stats import norm
 from sklearn.linear_model import LogisticRegression
 
 from ferryid.errors import FerryIdError
-from ferryid.validation.detection_curves import USUAL, Slopes, common_slopes, curve, ratio
+from ferryid.validation.detection_curves import curve, ratio
 
 SIZES = (0.25, 0.5, 1.0, 2.0, 4.0)
 RELIABLE = 1.4
@@ -26,7 +26,7 @@ def runs(named: tuple[int, ...], each: int = 6) -> tuple[list[float], list[bool]
 def test_two_sizes_without_a_prior_worked_by_hand() -> None:
     # With as many parameters as sizes the curve goes through the shares: logit 1/4 = -log 3 at 1, logit 3/4 = log 3 at e.
     sizes, named = [1.0] * 4 + [exp(1.0)] * 4, [True, False, False, False, True, True, True, False]
-    made = curve(sizes, named, prior=None)
+    made = curve(sizes, named, prior=False)
     slope = 2.0 * log(3.0)
     assert made.slope == pytest.approx(slope, rel=0.01)
     # The profile's top lies where logit 19/20 = log 19 is reached, beyond the sizes tried here.
@@ -41,7 +41,7 @@ def test_without_a_prior_it_is_logistic_regression() -> None:
     x = rng.normal(size=200)
     named = rng.random(200) < expit(1.0 + 2.5 * x)
     other = LogisticRegression(C=1e9, tol=1e-10).fit(x[:, None], named)
-    made = curve(np.exp(x).tolist(), named.tolist(), prior=None)
+    made = curve(np.exp(x).tolist(), named.tolist(), prior=False)
     assert made.size == pytest.approx(exp((log(19.0) - other.intercept_[0]) / other.coef_[0, 0]), rel=2e-3)
     assert made.slope == pytest.approx(other.coef_[0, 0], rel=5e-3)
 
@@ -144,40 +144,3 @@ def test_sizes_of_nothing_have_no_curve() -> None:
         curve([0.0, 1.0], [False, True])
     with pytest.raises(FerryIdError, match=r"found 0 sizes"):
         curve([], [])
-
-
-def test_slopes_of_many_curves_are_estimated_from_all_of_them() -> None:
-    rng = np.random.default_rng(3)
-
-    def drawn(slope: float) -> list[tuple[list[float], list[bool]]]:
-        every = []
-        for _ in range(24):
-            x = rng.uniform(-1.5, 1.5, 20)
-            named = rng.random(20) < expit(log(19.0) + slope * (x - rng.uniform(-0.5, 1.0)))
-            every.append((np.exp(x).tolist(), named.tolist()))
-        return every
-
-    for slope in (2.5, 12.0):
-        found = common_slopes(drawn(slope))
-        assert found.shape * found.scale == pytest.approx(slope, rel=0.35)
-    # What is always or never named shows next to no slope.
-    nothing = common_slopes([runs((6, 6, 6, 6, 6)), runs((0, 0, 0, 0, 0))])
-    assert nothing.shape * nothing.scale == pytest.approx(USUAL.shape * USUAL.scale, rel=0.15)
-    assert common_slopes([]) == USUAL
-
-
-@pytest.mark.slow
-def test_a_size_is_known_better_by_the_slopes_of_others_and_its_interval_still_holds() -> None:
-    rng = np.random.default_rng(5)
-    prior, held, narrower = Slopes(6.0, 1.0), 0, []
-    for _ in range(60):
-        x = rng.uniform(-1.5, 1.5, 10)
-        place = rng.uniform(-0.5, 0.8)
-        named = rng.random(10) < expit(log(19.0) + rng.gamma(6.0, 1.0) * (x - place))
-        known, alone = (curve(np.exp(x).tolist(), named.tolist(), one) for one in (prior, USUAL))
-        held += known.low <= exp(place) <= known.high
-        if alone.low > 0.0 and alone.high < inf:
-            narrower.append((known.high / known.low) / (alone.high / alone.low))
-    # 54 are the 95 % interval's lower end of a binomial of 60 with 0.95.
-    assert held >= 54
-    assert np.median(narrower) < 0.85

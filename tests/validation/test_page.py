@@ -8,8 +8,10 @@ from xml.etree import ElementTree
 
 import pytest
 
+from ferryid.validation.detection_curves import curve
 from ferryid.validation.name_scores import Share
 from ferryid.validation.page import figures, page
+from ferryid.validation.page_parts import how_well_known
 from ferryid.validation.plant.effects import plant_effects
 from ferryid.validation.records import TransferResult, TransferScore
 from ferryid.validation.run import render_summary
@@ -120,6 +122,18 @@ def test_the_figures_are_drawings_of_what_there_is() -> None:
     for text in drawn.values():
         assert ElementTree.fromstring(text).tag.endswith("svg")
     assert set(figures(score([result([], [], "clean", "clean")]))) == {"confusion.svg"}
+
+
+def test_the_page_says_how_well_sizes_are_known() -> None:
+    # Many runs on either side of one, few runs, and two whose sizes are not among those tried.
+    many = curve([0.8] * 60 + [1.2] * 60, [False] * 60 + [True] * 60)
+    few = curve([0.25, 0.5, 2.0, 4.0], [False, False, True, True])
+    beyond, below = curve([1.0, 2.0], [False, False]), curve([1.0, 2.0], [True, True])
+    assert many.high / many.low < 4.0 < few.high / few.low
+    said = how_well_known([many, few, beyond, below])
+    assert said.startswith("Of 4 such sizes 2 are among the sizes tried and known to a factor of ")
+    assert said.endswith(", 1 of them to a factor of two or better.")
+    assert how_well_known([beyond, below]) == ""
 
 
 def test_campaigns_at_sea_have_a_section_of_their_own() -> None:

@@ -43,12 +43,7 @@ def unlike_others(responses: Mapping[str, ForceResponse | None], profile: Profil
     any axis has an answer to it. Nothing is left out on an axis on which as many logs disagree as follow the force: the profile
     is wrong then.
 
-    Parameters
-    ----------
-    responses
-        How the vessel accelerates in each log, by the log's path; None where that is not known.
-    profile
-        The vessel.
+    Parameters are those of `unengaged`.
     """
     known = {path: one for path, one in responses.items() if one is not None}
     followed = {path: _followed(one) for path, one in known.items()}

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from ferryid.json_record import Record
-from ferryid.validation.detection_curves import Curve, common_slopes, curve
+from ferryid.validation.detection_curves import Curve, curve
 from ferryid.validation.name_scores import Share
 from ferryid.validation.recorded.case_sampling import MULTIPLES, TWICE
 
@@ -30,6 +30,16 @@ class Doses(Record):
     multiples: tuple[float, ...]
     named: tuple[bool, ...]
     noticed: tuple[bool, ...]
+
+    @property
+    def curve(self) -> Curve:
+        """Detection curve over the multiples."""
+        return curve(self.multiples, self.named)
+
+    @property
+    def noticed_curve(self) -> Curve:
+        """The same of names and new hints."""
+        return curve(self.multiples, self.noticed)
 
     def at(self, level: int, *, noticed: bool = False) -> Share:
         """Return the share that was named from one of `MULTIPLES` to the next."""
@@ -62,13 +72,3 @@ def pooled(every: Sequence[Doses]) -> tuple[Doses, ...]:
     """Return doses effect by effect, in the order of their first; effects without a dose are left out."""
     names = dict.fromkeys(one.effect for one in every if one.multiples)
     return tuple(joined(name, [one for one in every if one.effect == name]) for name in names)
-
-
-def curves(every: Sequence[Doses]) -> Mapping[str, tuple[Curve, Curve]]:
-    """Return two detection curves over the multiples by effect: of names, and of names and new hints."""
-    named = common_slopes((one.multiples, one.named) for one in every)
-    noticed = common_slopes((one.multiples, one.noticed) for one in every)
-    return {
-        one.effect: (curve(one.multiples, one.named, named), curve(one.multiples, one.noticed, noticed))
-        for one in every
-    }

@@ -9,11 +9,10 @@ import numpy as np
 
 from ferryid.counts import counted
 from ferryid.report.validation_figures import Detected, detection_curves
-from ferryid.validation.detection_curves import Curve
 from ferryid.validation.name_scores import Share
 from ferryid.validation.page_parts import BEYOND, answers, error_figure, error_row, few, how_well_known, render
 from ferryid.validation.recorded.case_sampling import MULTIPLES, NotMade
-from ferryid.validation.recorded.doses import RELATIVE_STEP, Doses, curves, joined, pooled
+from ferryid.validation.recorded.doses import RELATIVE_STEP, Doses, joined, pooled
 from ferryid.validation.recorded.effects import ACTUATOR, LOAD, SENSOR, concealments
 from ferryid.validation.recorded.scores import (
     TWICE_DISTINCT,
@@ -35,7 +34,7 @@ def figures(scores: RecordedScores) -> dict[str, str]:
     drawn = {}
     shown = pooled([one.doses for one in scores.responses])
     if shown:
-        drawn["detection.svg"] = detection_curves([_detected(one, *curves(shown)[one.effect]) for one in shown])
+        drawn["detection.svg"] = detection_curves([_detected(one) for one in shown])
     return drawn | error_figure(scores.recoveries)
 
 
@@ -86,7 +85,7 @@ def page(result: Mapping[str, Any], scores: RecordedScores) -> str:
         "by_family": _by_family(scores),
         "multiples": [f"{one:g}" for one in MULTIPLES],
         "by_multiple": _by_multiple(scores.responses),
-        "how_well_known": how_well_known(_pooled_curves(scores.responses)),
+        "how_well_known": how_well_known([one.curve for one in pooled([each.doses for each in scores.responses])]),
         "changes": [_row(one) for one in scores.changes],
         "changes_by_multiple": _by_multiple(scores.changes),
         "changes_from_twice_distinct": from_twice_distinct(scores.changes),
@@ -138,38 +137,29 @@ def _moved(one: Moved) -> tuple[str, ...]:
     return one.effect, one.recording, one.parameter, *numbers, found
 
 
-def _detected(one: Doses, named: Curve, noticed: Curve) -> Detected:
+def _detected(one: Doses) -> Detected:
     return Detected(
         one.effect,
         "multiple of the oracle's size",
         (MULTIPLES[0] / BEYOND, MULTIPLES[-1] * RELATIVE_STEP),
-        answers(one.multiples, one.named, named),
-        answers(one.multiples, one.noticed, noticed),
+        answers(one.multiples, one.named, one.curve),
+        answers(one.multiples, one.noticed, one.noticed_curve),
     )
 
 
 def _by_multiple(responses: Sequence[DoseResponse]) -> list[tuple[str, ...]]:
     """Return for each family, each effect and all how many doses were named at each multiple, and from which on they are."""
     known, every = concealments(), [one.doses for one in responses]
-    reliable = dict(zip((one.effect for one in pooled(every)), _pooled_curves(responses), strict=True))
-    rows = [("all", joined("all", every))]
+    rows = [("all", joined("all", every), "")]
     for family, title in FAMILIES.items():
         mine = [one for one in every if known[one.effect].family == family]
-        rows += [(f"*{title}*", joined(family, mine)), *((one.effect, one) for one in pooled(mine))]
-    shown = [(title, one) for title, one in rows if one.multiples]
+        # Several effects together have no size of their own.
+        rows += [(f"*{title}*", joined(family, mine), ""), *((one.effect, one, one.curve.text) for one in pooled(mine))]
     return [
-        (
-            title,
-            *(few(one.at(level)) for level in range(len(MULTIPLES))),
-            reliable[title].text if title in reliable else "",
-        )
-        for title, one in shown
+        (title, *(few(one.at(level)) for level in range(len(MULTIPLES))), reliable)
+        for title, one, reliable in rows
+        if one.multiples
     ]
-
-
-def _pooled_curves(responses: Sequence[DoseResponse]) -> list[Curve]:
-    """Return the detection curves of names over the multiples, effect by effect in all recordings together."""
-    return [named for named, _ in curves(pooled([one.doses for one in responses])).values()]
 
 
 def _distinct_by_family(scores: RecordedScores) -> str:

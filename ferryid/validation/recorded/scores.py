@@ -10,7 +10,7 @@ import numpy as np
 
 from ferryid.json_record import Record
 from ferryid.validation.case import Case, Truth
-from ferryid.validation.detection_curves import Curve, common_slopes, curve
+from ferryid.validation.detection_curves import Curve, curve
 from ferryid.validation.estimate_errors import EstimateErrors, estimate_errors
 from ferryid.validation.name_scores import HULL, Share, label, names, outcome_of_missed, why_missed, wrong_names
 from ferryid.validation.recorded.case_sampling import NotMade
@@ -479,20 +479,7 @@ def _responses(results: Sequence[CaseResult], plain: Mapping[str, CaseResult], k
             sorted_by.setdefault((_effect(result.case), result.case.path), []).append(result)
     places = {name: place for place, name in enumerate(concealments())}
     keys = sorted(sorted_by, key=lambda key: (places[key[0]], key[1]))
-    return _with_curves([_response(*key, sorted_by[key], plain[key[1]]) for key in keys])
-
-
-def _with_curves(responses: Sequence[DoseResponse]) -> tuple[DoseResponse, ...]:
-    """Return responses with their detection curves, whose slopes are of one distribution."""
-    tried = [one for one in responses if one.sizes]
-    named = common_slopes((one.sizes, one.named) for one in tried)
-    noticed = common_slopes((one.sizes, one.noticed) for one in tried)
-    return tuple(
-        replace(one, curve=curve(one.sizes, one.named, named), noticed_curve=curve(one.sizes, one.noticed, noticed))
-        if one.sizes
-        else one
-        for one in responses
-    )
+    return tuple(_response(*key, sorted_by[key], plain[key[1]]) for key in keys)
 
 
 def _response(effect: str, recording: str, results: Sequence[CaseResult], plain: CaseResult) -> DoseResponse:
@@ -512,8 +499,8 @@ def _response(effect: str, recording: str, results: Sequence[CaseResult], plain:
         sizes,
         named,
         noticed,
-        None,
-        None,
+        curve(sizes, named) if fresh else None,
+        curve(sizes, noticed) if fresh else None,
         dict(lost.most_common()),
         tuple(one.case.oracle_size for one in fresh),
         tuple(one.case.distinct_size for one in fresh),

@@ -46,7 +46,7 @@ def conceal(log: RecordedLog, truth: Truth, rng: np.random.Generator) -> Conceal
 def cannot(log: RecordedLog) -> str:
     """Return why no limit can be concealed."""
     if not able(log):
-        return "no actuator has a thrust curve with an end and an unmeasured force"
+        return "no actuator of unmeasured force has a thrust curve whose limits are stated (valid)"
     least = min(float(np.nanquantile(thrust_of(log, drives(log)[name]), MOST)) for name in able(log))
     return "" if least > 0.0 else "an actuator of it never pushes ahead"
 
