@@ -30,13 +30,14 @@ from ferryid.diagnose.inference.estimation import (
 )
 from ferryid.diagnose.inference.folds import Folds, by_block, draws, subset
 from ferryid.diagnose.inference.force_errors import force_errors, mass_of
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.free_runs import FreeRuns, free_runs
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.effect import HELD
 from ferryid.effects.force_model import Action, ForceModel, as_measured, touches
 from ferryid.side_by_side import over
-from ferryid.types import Floats
+from ferryid.types import Flags, Floats
 
 HEADING = "heading mirrored"
 ACTING_BY_FORCE = frozenset({"measurements", "parts", "angles", "external", "air", "air_factors", "gust_std"})
@@ -190,14 +191,38 @@ def held_out(
         return fit(part, candidates, own_start, begin=begin)
 
     gaps = np.empty((len(problem.windows.starts), int(problem.windows.channels.sum())))
-    errors = np.empty((len(problem.windows.starts), 3))
     fits = over(made_of, folds.training)
     for k, made in enumerate(fits):
         own = folds.fold == k
-        judged, force_model = subset(problem.windows, own), fitted_force_model(problem.plain, made)
-        gaps[own] = judged.gap(force_model)
-        errors[own] = force_errors(judged, force_model, problem.plain)
+        gaps[own] = subset(problem.windows, own).gap(fitted_force_model(problem.plain, made))
+    errors = np.empty((len(problem.windows.starts), 3))
+    moves = _hull_moves(problem, folds, gaps)
+    fits = [replace(made, hull=made.hull + problem.hull_spread * move) for made, move in zip(fits, moves, strict=True)]
+    for k, made in enumerate(fits):
+        own = folds.fold == k
+        errors[own] = force_errors(
+            subset(problem.windows, own), fitted_force_model(problem.plain, made), problem.plain
+        )
     return HeldOut(gaps, errors, tuple(fits))
+
+
+def _hull_moves(problem: EstimationProblem, folds: Folds, gaps: Floats) -> list[Floats]:
+    white = problem.noise.white(gaps, problem.windows.runs)
+    made = []
+    for rows, slopes, information in _unknown_hull(problem, folds):
+        made.append(np.linalg.solve(information + slopes.T @ slopes, -slopes.T @ white[rows]))
+    return made
+
+
+def _unknown_hull(problem: EstimationProblem, folds: Folds) -> list[tuple[Flags, Floats, Floats]]:
+    runs, c = problem.windows.runs, int(problem.windows.channels.sum())
+    kept = np.concatenate([np.arange(a + ORDER, b) for a, b in runs if b - a > ORDER])
+    made = []
+    for k, training in enumerate(folds.training):
+        rows = np.repeat(folds.fold[kept] == k, c)
+        known = problem.part(training).hull_information / INFERENCE.posterior_factor**2
+        made.append((rows, problem.window_slopes[rows], known))
+    return made
 
 
 def compare_held_out(problem: EstimationProblem, folds: Folds, before: HeldOut, after: HeldOut) -> Improvement:
@@ -383,10 +408,20 @@ def _hull_strains(
 
 
 def _gains(problem: EstimationProblem, folds: Folds, before: Floats, after: Floats) -> Floats:
-    """Return the gain in log-likelihood of every block, shape (blocks,)."""
+    """Return the gain in log-likelihood of every block, shape (blocks,).
+
+    Of the prediction, which is as uncertain as the hull: where the windows of a fold move the vessel as no others do, its
+    coefficients there are what was believed of them, and errors within that speak neither for nor against an effect.
+    """
     runs, c = problem.windows.runs, before.shape[1]
     kept = np.concatenate([np.arange(a + ORDER, b) for a, b in runs if b - a > ORDER])
-    left = [np.sum(problem.noise.white(gaps, runs).reshape(-1, c) ** 2, axis=1) for gaps in (before, after)]
+    left = []
+    for gaps in (before, after):
+        white = problem.noise.white(gaps, runs)
+        weighted = white.copy()
+        for rows, N, known in _unknown_hull(problem, folds):
+            weighted[rows] -= N @ np.linalg.solve(known + N.T @ N, N.T @ white[rows])
+        left.append(np.sum((white * weighted).reshape(-1, c), axis=1))
     gained = np.zeros(len(folds.block))
     gained[kept] = 0.5 * (left[0] - left[1])
     return by_block(gained[:, None], folds.block)[:, 0]
