@@ -145,19 +145,14 @@ class EstimationProblem:
         return self.hull_slopes(self.plain)
 
     @cached_property
-    def hull_information(self) -> Floats:
-        """What is known of the hull's coefficients, in their spreads, beside no effect: the posterior's precision, (26, 26)."""
-        return np.asarray(self.by_hull.T @ self.by_hull + np.eye(len(self.hull_spread)))
-
-    @cached_property
     def window_slopes(self) -> Floats:
-        """Return derivatives of the windows' whitened errors by the hull's coefficients, in their spreads, shape (w, 26)."""
+        """Derivatives of the windows' whitened errors by the hull's coefficients, in their spreads, shape (w, 26)."""
         free = np.flatnonzero(self.hull_spread)
-        every = np.zeros((self.noise.white(self.windows.gap(self.plain), self.windows.runs).shape[0], len(self.hull_spread)))
+        moves = HULL_DIFFERENCE * self.hull_spread[free]
+        changes = np.zeros((*self.windows.measured_channels.shape, len(self.hull_spread)))
         if free.size:
-            changes = self.windows.hull_changes(self.plain, free, HULL_DIFFERENCE * self.hull_spread[free])
-            every[:, free] = self.noise.white(changes, self.windows.runs) / HULL_DIFFERENCE
-        return every
+            changes[:, :, free] = self.windows.hull_changes(self.plain, free, moves) / HULL_DIFFERENCE
+        return self.noise.white(changes, self.windows.runs)
 
     def hull_slopes(self, force_model: ForceModel, hull: Floats | None = None) -> Floats:
         """Return derivatives of the prediction errors by the hull's coefficients, in their spreads, shape (w, 26).

@@ -16,6 +16,7 @@ from ferryid.diagnose.judging.held_out import HeldOutEvidence, held_out_evidence
 from ferryid.diagnose.judging.rivals import (
     RivalComparison,
     compare_rivals,
+    least_gain,
     redundant_shape,
     with_both,
     without_companions,
@@ -83,7 +84,8 @@ def eliminate_backward(
         if swaps < JUDGING.most_replacements:
             progress("weighing rivals")
             standings = _standings(problem, kept, library)
-        better = [(i, one) for i, standing in enumerate(standings) for one in standing.rivals[:1] if one.gain > 0.0]
+        better = [(i, one) for i, standing in enumerate(standings) for one in standing.rivals[:1]]
+        better = [(i, one) for i, one in better if one.gain > least_gain(problem, kept, i, one)]
         better = [(i, one) for i, one in better if one.fit.keys not in tried]
         swapped = None
         for replaced, best in sorted(better, key=lambda pair: -pair[1].gain):

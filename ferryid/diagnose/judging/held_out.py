@@ -2,7 +2,8 @@
 
 The log is cut into contiguous blocks, dealt to folds in turn. For every fold the hypothesis, hull included, is fitted to the
 windows of the other folds that stay a purge gap away, and judged on the windows of its own: so every window is judged once, by
-a fit that has not seen it. Which effects were chosen, and when they begin, is known from the whole log.
+a fit that has not seen it. The hull may move there within what the others leave open of it, with what is judged and without
+(`ferryid.diagnose.inference.hull_uncertainty`). Which effects were chosen, and when they begin, is known from the whole log.
 
 Errors are judged in the weak form: ``M (a_picture - a_measured)`` averaged over a window, with the velocities' first derivative
 moved onto the window's weight and the mass matrix of the plain force model, before and after alike. That is a force along the
@@ -30,14 +31,14 @@ from ferryid.diagnose.inference.estimation import (
 )
 from ferryid.diagnose.inference.folds import Folds, by_block, draws, subset
 from ferryid.diagnose.inference.force_errors import force_errors, mass_of
-from ferryid.diagnose.inference.thresholds import INFERENCE
+from ferryid.diagnose.inference.hull_uncertainty import hull_uncertainty
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.free_runs import FreeRuns, free_runs
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.effect import HELD
 from ferryid.effects.force_model import Action, ForceModel, as_measured, touches
 from ferryid.side_by_side import over
-from ferryid.types import Flags, Floats
+from ferryid.types import Floats
 
 HEADING = "heading mirrored"
 ACTING_BY_FORCE = frozenset({"measurements", "parts", "angles", "external", "air", "air_factors", "gust_std"})
@@ -55,9 +56,9 @@ class HeldOut:
     gaps
         On the channels that are fitted, shape (J, channels).
     errors
-        As forces along the vessel's axes [N, N, N·m], shape (J, 3).
+        As forces along the vessel's axes [N, N, N·m], of the fold's fit with the hull moved, shape (J, 3).
     fits
-        One for every fold.
+        One for every fold, with the hull moved.
     """
 
     gaps: Floats
@@ -195,34 +196,15 @@ def held_out(
     for k, made in enumerate(fits):
         own = folds.fold == k
         gaps[own] = subset(problem.windows, own).gap(fitted_force_model(problem.plain, made))
-    errors = np.empty((len(problem.windows.starts), 3))
-    moves = _hull_moves(problem, folds, gaps)
+    white = problem.noise.white(gaps, problem.windows.runs)
+    moves = [known.move(white) for known in hull_uncertainty(problem, folds)]
     fits = [replace(made, hull=made.hull + problem.hull_spread * move) for made, move in zip(fits, moves, strict=True)]
+    errors = np.empty((len(problem.windows.starts), 3))
     for k, made in enumerate(fits):
         own = folds.fold == k
-        errors[own] = force_errors(
-            subset(problem.windows, own), fitted_force_model(problem.plain, made), problem.plain
-        )
+        force_model = fitted_force_model(problem.plain, made)
+        errors[own] = force_errors(subset(problem.windows, own), force_model, problem.plain)
     return HeldOut(gaps, errors, tuple(fits))
-
-
-def _hull_moves(problem: EstimationProblem, folds: Folds, gaps: Floats) -> list[Floats]:
-    white = problem.noise.white(gaps, problem.windows.runs)
-    made = []
-    for rows, slopes, information in _unknown_hull(problem, folds):
-        made.append(np.linalg.solve(information + slopes.T @ slopes, -slopes.T @ white[rows]))
-    return made
-
-
-def _unknown_hull(problem: EstimationProblem, folds: Folds) -> list[tuple[Flags, Floats, Floats]]:
-    runs, c = problem.windows.runs, int(problem.windows.channels.sum())
-    kept = np.concatenate([np.arange(a + ORDER, b) for a, b in runs if b - a > ORDER])
-    made = []
-    for k, training in enumerate(folds.training):
-        rows = np.repeat(folds.fold[kept] == k, c)
-        known = problem.part(training).hull_information / INFERENCE.posterior_factor**2
-        made.append((rows, problem.window_slopes[rows], known))
-    return made
 
 
 def compare_held_out(problem: EstimationProblem, folds: Folds, before: HeldOut, after: HeldOut) -> Improvement:
@@ -408,20 +390,16 @@ def _hull_strains(
 
 
 def _gains(problem: EstimationProblem, folds: Folds, before: Floats, after: Floats) -> Floats:
-    """Return the gain in log-likelihood of every block, shape (blocks,).
-
-    Of the prediction, which is as uncertain as the hull: where the windows of a fold move the vessel as no others do, its
-    coefficients there are what was believed of them, and errors within that speak neither for nor against an effect.
-    """
+    """Return the gain in the logarithm of the predictive probability of every block, shape (blocks,)."""
     runs, c = problem.windows.runs, before.shape[1]
     kept = np.concatenate([np.arange(a + ORDER, b) for a, b in runs if b - a > ORDER])
+    known = hull_uncertainty(problem, folds)
     left = []
-    for gaps in (before, after):
-        white = problem.noise.white(gaps, runs)
-        weighted = white.copy()
-        for rows, N, known in _unknown_hull(problem, folds):
-            weighted[rows] -= N @ np.linalg.solve(known + N.T @ N, N.T @ white[rows])
-        left.append(np.sum((white * weighted).reshape(-1, c), axis=1))
+    for white in (problem.noise.white(gaps, runs) for gaps in (before, after)):
+        squares = np.zeros_like(white)
+        for one in known:
+            squares[one.rows] = white[one.rows] * one.weighed(white)
+        left.append(np.sum(squares.reshape(-1, c), axis=1))
     gained = np.zeros(len(folds.block))
     gained[kept] = 0.5 * (left[0] - left[1])
     return by_block(gained[:, None], folds.block)[:, 0]

@@ -147,6 +147,14 @@ def redundant_shape(
     return None
 
 
+def is_doubted_where(problem: EstimationProblem, made: Fit, index: int) -> bool:
+    """Tell whether a candidate may stand in for a simpler one by where the vessel was, as a mooring whose pull is constant."""
+    candidate = made.candidates[index]
+    values = {one.name: value for one, value in zip(candidate.parameters, made.values[index].tolist(), strict=True)}
+    values |= {"onset": candidate.onset_s, "offset": candidate.offset_s}
+    return bool(candidate.effect.doubt_where(values, problem.plain.measurements))
+
+
 def compare_rivals(problem: EstimationProblem, kept: Fit, index: int, library: Sequence[Candidate]) -> RivalComparison:
     """Return how a candidate stands against every other of the library in its place, in its span.
 
@@ -195,8 +203,24 @@ def compare_rivals(problem: EstimationProblem, kept: Fit, index: int, library: S
     # How far behind the others are does not matter to the digit.
     rivals[: JUDGING.fitted_rivals] = over(settled_in, rivals[: JUDGING.fitted_rivals])
     rivals.sort(key=lambda one: -one.gain)
+    if not is_doubted_where(problem, kept, index):
+        # What may stand in for the candidate, and explains no more, is the same in other words.
+        rivals = [one for one in rivals if one.gain > JUDGING.unresolved_evidence or not _is_doubted(problem, one)]
     against = none + sum(exp(min(one.gain, 50.0)) for one in rivals)
     return RivalComparison(tuple(rivals), 1.0 / (1.0 + against), kept.evidence - bare.evidence)
+
+
+def _is_doubted(problem: EstimationProblem, one: RivalFit) -> bool:
+    return is_doubted_where(problem, one.fit, len(one.fit.candidates) - 1)
+
+
+def least_gain(problem: EstimationProblem, kept: Fit, index: int, rival: RivalFit) -> float:
+    """Return the evidence over that of a candidate from which a rival takes its place [nat].
+
+    A candidate that may stand in for a simpler one by where the vessel was gives way to what explains nearly as much.
+    """
+    gives_way = is_doubted_where(problem, kept, index) and not _is_doubted(problem, rival)
+    return -JUDGING.unresolved_evidence if gives_way else 0.0
 
 
 def with_both(problem: EstimationProblem, kept: Fit, index: int, rival: Fit) -> Fit:

@@ -48,8 +48,12 @@ def sailed(
     *,
     current: tuple[float, float] = (0.0, 0.0),
     steady: tuple[float, float, float] | None = None,
+    swaying: tuple[float, float] = (0.0, np.inf),
 ) -> Measurements:
-    """Integrate the ferry by scipy under a force of many periods, or a steady one, and measure it with white noise."""
+    """Integrate the ferry by scipy under a force of many periods, or a steady one, and measure it with white noise.
+
+    Across only while it is `swaying`, if a span is given.
+    """
 
     def tau(t: float) -> np.ndarray:
         if steady is not None:
@@ -58,7 +62,7 @@ def sailed(
         return np.array(
             [
                 60.0 + 120.0 * np.sin(t / 7.1) + 80.0 * np.sin(t / 17.3),
-                90.0 * np.sin(t / 11.7 + 1.0),
+                90.0 * np.sin(t / 11.7 + 1.0) * (swaying[0] < t < swaying[1]),
                 120.0 * np.sin(t / 9.1 + 2.0) + 100.0 * np.sin(t / 29.0),
             ]
         )
@@ -178,6 +182,22 @@ def test_a_block_is_judged_by_fits_that_have_not_seen_it(windy: EstimationProble
     assert again is not None
     other = held_out(changed, again, [candidate("wind")])
     np.testing.assert_allclose(other.gaps[own], judged.gaps[own] - 0.5, atol=1e-9)
+
+
+@pytest.mark.parametrize("damping", [1.0, 2.5])
+def test_what_one_stretch_alone_shows_of_the_hull_is_no_evidence(damping: float) -> None:
+    """What a wind gains in stretches that were left out is as much as its evidence, also where the hull is not known there.
+
+    The ferry swings and sways in one block alone: the others cannot tell how it is damped across.
+    """
+    across = {name: damping * FERRY.hull.D[name] for name in ("Y_v", "Y_|v|v", "Y_vvv")}
+    hull = replace(FERRY.hull, D={**FERRY.hull.D, **across})
+    problem = trial_on(sailed(480.0, 0.25 * WIND, hull=hull, swaying=(120.0, 160.0)))
+    problem = problem.with_noise_of(fit(problem, [candidate("wind")]))
+    found, nothing = fit(problem, [candidate("wind")]), fit(problem, [])
+    told = held_out_evidence(problem, found)
+    assert told is not None
+    assert told.whole.score == pytest.approx(found.evidence - nothing.evidence, rel=0.3)
 
 
 def test_a_wind_that_blew_holds_and_beats_every_placebo(windy: EstimationProblem) -> None:

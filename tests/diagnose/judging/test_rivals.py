@@ -7,14 +7,25 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
-from ferryid.diagnose.inference.estimation import Candidate, Fit
+from ferryid.diagnose.inference.estimation import Candidate, Fit, fit
 from ferryid.diagnose.judging import campaign_properties
 from ferryid.diagnose.judging.campaign_properties import _one_of_two_that_hide, _one_shape_of_each_curve
-from ferryid.diagnose.judging.rivals import RivalComparison, RivalFit, redundant_shape, same_curve
+from ferryid.diagnose.judging.rivals import (
+    RivalComparison,
+    RivalFit,
+    compare_rivals,
+    is_doubted_where,
+    least_gain,
+    redundant_shape,
+    same_curve,
+)
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
+from ferryid.vessel.frames import to_body
+from tests.diagnose.judging.test_held_out import FERRY, sailed, trial_on
 
 LIMIT, AIR = "thrust_saturation", "ventilation"
 
@@ -161,3 +172,30 @@ def test_of_a_delay_and_a_lag_that_hide_each_other_a_campaign_keeps_one(
     assert [one.effect.id for one in made.campaign.properties] == kept
     gone = [one for one in both if one.effect.id not in kept]
     assert [one.candidate for every in rivals.values() for one in every] == gone
+
+
+@pytest.mark.slow
+def test_a_mooring_whose_pull_is_constant_gives_way_to_a_push() -> None:
+    """A push of 150 s to the south is also the pull of a line that is so long that the place hardly matters."""
+    seen = sailed(480.0, np.zeros(2))
+    span = (seen.t > 160.0) & (seen.t < 310.0)
+    push = np.where(span, -200.0, 0.0)
+    # The records claim what acted less the push, so that the push and they explain the motion.
+    claimed = seen.parts.copy()
+    claimed[:, 0, :2] -= np.column_stack(to_body(push, 0.0 * push, seen.psi))
+    problem = trial_on(replace(seen, parts=claimed))
+    mooring, pushed = (
+        replace(Candidate(effects()[name], None, effects()[name].parameters_of(FERRY)), onset_s=160.0, offset_s=310.0)
+        for name in ("mooring", "external_push")
+    )
+    far = fit(problem, [mooring], [np.array([1.0, 0.0, -200.0, 0.0])])
+    problem = problem.with_noise_of(far)
+    far, near = fit(problem, [mooring], far.values), fit(problem, [pushed], [np.array([-200.0, 0.0, 0.0])])
+    assert is_doubted_where(problem, far, 0)
+    assert not is_doubted_where(problem, near, 0)
+    (rival,) = compare_rivals(problem, far, 0, [pushed]).rivals
+    assert least_gain(problem, far, 0, rival) == -JUDGING.unresolved_evidence
+    assert least_gain(problem, near, 0, rival) == 0.0
+    line = compare_rivals(problem, near, 0, [mooring])
+    assert line.rivals == ()
+    assert line.probability > 0.99
