@@ -94,14 +94,16 @@ def select_law(problem: EstimationProblem, kept: Fit, folds: Folds, unlike: Floa
     folds
         Of the trial's windows.
     unlike
-        What an effect moves the gaps by, shape (J, c): no term that says the same, as a share of a thruster's force says what a
-        weak thruster does. Any will do where None.
+        What an effect moves the gaps by, shape (J, c): no term that says the same, nor the share of any actuator's force, which
+        has a name and is weighed as a rival: beside masses and damping that may be off, one thruster that is weaker is another
+        that is stronger. Any will do where None.
     """
     # Of the level of a step anything may be true, as of the hull.
     levels = {(f"force of {one.instance}", "1") for one in kept.candidates if one.is_step}
     terms = [one for one in terms_of(problem.plain.measurements) if one.key not in levels]
     if unlike is not None:
-        terms = _unlike(problem, kept, terms, unlike)
+        unnamed = [one for one in terms if one.key[1] != "1" or not one.key[0].startswith("force of ")]
+        terms = _unlike(problem, kept, unnamed, unlike)
     chosen: list[Term] = []
     made, refitted = kept, problem
     gains: list[tuple[float, float]] = []

@@ -232,6 +232,19 @@ def test_an_effect_that_a_law_makes_idle_is_an_impostor_and_a_true_one_is_not() 
     assert find_displaced(problem, fit(problem, [breeze], kept.values)) == ()
 
 
+def test_a_weak_thruster_beside_a_hull_that_lacks_terms_is_no_strong_one() -> None:
+    """Three per cent less from the first is, but for masses and damping, three more from the second: that is no law."""
+    u, v, r = nu().T
+    lost = -0.03 * sailed(0).parts[:, 0]
+    problem = trial_with(lost + pushes(yaw=400.0 * u * r - 1500.0 * np.abs(v) * r))
+    gain = effects()["thruster_gain"]
+    candidate = Candidate(gain, "thruster1", gain.parameters_of(FERRY))
+    problem = problem.with_noise_of(fit(problem, [candidate]))
+    kept = fit(problem, [candidate])
+    assert kept.values[0] == pytest.approx([0.97], abs=0.005)
+    assert find_displaced(problem, kept) == ()
+
+
 def test_terms_are_forces_of_the_force_model() -> None:
     problem = trial_with(pushes())
     force_model = problem.plain
