@@ -55,7 +55,8 @@ def cannot(measurements: Measurements) -> str:
 
 def says(values: Values, instance: str | None) -> str:
     """Return the finding as a sentence."""
-    return f"Thrust falls by {100.0 * values['per_mps']:.0f} % per m/s of water flowing into the propellers."
+    share = 100.0 * values["per_mps"]
+    return f"Thrust {'falls' if share >= 0.0 else 'rises'} by {abs(share):.0f} % per m/s of water flowing into the propellers."
 
 
 def scenario(values: Values, instance: str | None) -> dict[str, Any]:

@@ -43,7 +43,8 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
 
 def says(values: Values, instance: str | None) -> str:
     """Return the finding as a sentence."""
-    return f"The thrusters' force follows their measured speed with a lag of {values['time_constant']:.2f} s."
+    lag_s = values["time_constant"]
+    return f"Thrust follows the recorded speeds, or orders where there is no feedback, with a lag of {lag_s:.2f} s."
 
 
 def scenario(values: Values, instance: str | None) -> dict[str, Any]:

@@ -337,7 +337,7 @@ class _Problem:
         power = np.linalg.solve(self.G(flat).T, points.T).T
         slopes = power[:, self.axes] * damping.functions
         slopes[:, np.isin(self.rows, list(self.acceleration.values()))] = 0.0
-        told = "The data want damping in {} that feeds the motion: it is held at none."
+        told = "At some velocities the data want damping in {} that feeds the motion: there it is held at none."
         surge, others = (told.format(which) for which in ("surge", "sway and yaw"))
         return [
             (slopes[k], levels[k], surge if points[k, 0] else others)

@@ -13,7 +13,10 @@ _PACKED = {
     b"Rar!": "RAR",
     b"PK\x03\x04": "zip",
 }
-_WORKBOOK = b"[Content_Types].xml"
+_WORKBOOK = re.compile(
+    rb"PK\x03\x04.{26}(?:\[Content_Types\]|docProps/|_rels/|xl/|mimetypeapplication/vnd\.oasis)", re.DOTALL
+)
+"""The head of a workbook: which of its members comes first depends on the program that wrote it."""
 _MAVLINK = (0xFE, 0xFD)
 _STAMP_US = (10**15, 5 * 10**15)
 """Microseconds since 1970 that a telemetry log may begin with: 2001 to 2128."""
@@ -30,7 +33,7 @@ def unread_file(head: bytes) -> tuple[str, str] | None:
     head
         First bytes of the file, 64 where it has as many.
     """
-    if head.startswith(b"PK\x03\x04") and _WORKBOOK in head:
+    if _WORKBOOK.match(head):
         return "a workbook of a spreadsheet program", "save the sheet as CSV"
     for magic, name in _PACKED.items():
         if head.startswith(magic):

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from ferryid.identify import FOLDS, FitSettings
 from ferryid.identify.sweeps import BY, Sweep, sweep_json, sweep_settings
 from ferryid.report.folder import made, place_of, write_folder
@@ -142,7 +144,7 @@ def _rows(found: Sweep, key: str) -> list[dict[str, Any]]:
         {
             "window_s": f"{found.windows_s[window]:g}",
             "components": count + 1,
-            "ratios": [f"{value:.4g}" for value in choice.over_base[window, count]],
+            "ratios": [f"{value:.4g}" if np.isfinite(value) else "–" for value in choice.over_base[window, count]],
             "score": f"{score[window, count]:.4f}",
             "band": f"{band[window, count]:.4f}",
             "chosen": (window, count) == (choice.window, choice.components - 1),

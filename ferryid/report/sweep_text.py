@@ -64,7 +64,9 @@ def _table(found: Sweep, choice: Selection) -> list[str]:
     title = "window" if found.what == "window" else "components"
     lines = [f"  {title:<12}" + "".join(f"{axis:>10}" for axis in AXES) + f"{'score':>10}"]
     for window, count, name in cells:
-        ratios = "".join(f"{value:>10.4g}" for value in choice.over_base[window, count])
+        ratios = "".join(
+            f"{value:>10.4g}" if np.isfinite(value) else f"{'–':>10}" for value in choice.over_base[window, count]
+        )
         chosen = (window, count) == (choice.window, choice.components - 1)
         lines.append(
             f"{'*' if chosen else ' '} {name:<12}{ratios}{score[window, count]:>10.4f} ± {band[window, count]:.4f}"

@@ -303,11 +303,11 @@ def _scalar(signal: Signal, values: Floats, scale: float) -> Floats:
 
 
 def _turned(values: list[Floats], frame: str) -> list[Floats]:
-    """Return a vector in NED or FRD order and signs."""
+    """Return a vector in NED or FRD order and signs; of a velocity, surge may stand alone."""
     if frame == "ENU":
         return [values[1], values[0]]
     if frame == "FLU":
-        return [values[0], -values[1]]
+        return [values[0], *(-value for value in values[1:])]
     return values
 
 

@@ -52,6 +52,16 @@ def test_what_is_small_on_a_small_boat_is_not_nothing(effect: str, values: dict[
     assert said in effects()[effect].says(values, None)
 
 
+def test_a_lag_of_orders_is_none_of_measured_speeds() -> None:
+    said = effects()["thruster_lag"].says({"time_constant": 2.37}, None)
+    assert said == "Thrust follows the recorded speeds, or orders where there is no feedback, with a lag of 2.37 s."
+
+
+@pytest.mark.parametrize(("loss", "said"), [(0.13, "falls by 13 % per m/s"), (-0.2, "rises by 20 % per m/s")])
+def test_a_loss_by_inflow_below_zero_is_a_rise(loss: float, said: str) -> None:
+    assert said in effects()["thrust_inflow_loss"].says({"per_mps": loss}, None)
+
+
 def test_a_bearing_stays_below_a_full_circle() -> None:
     assert bearing(359.7) == "0 deg (north)"
     assert bearing(-0.4) == "0 deg (north)"

@@ -26,6 +26,7 @@ from ferryid.report.sweep_text import render_sweep
 from ferryid.signals.prepare import Opened, open_track
 from ferryid.signals.smooth import Measured, smooth_measured
 from ferryid.types import RunContext
+from ferryid.vessel.profile import Profile
 from tests.identify.rounds import PROFILE, recorded_as
 from tests.identify.trials import measured
 
@@ -44,7 +45,13 @@ def opened(tmp_path_factory: pytest.TempPathFactory) -> Opened:
 def run(monkeypatch: pytest.MonkeyPatch, opened: Opened) -> Run:
     """Return a function that sweeps logs made in memory."""
 
-    def swept(what: str, logs: Sequence[Measured], settings: FitSettings = SETTINGS, **options: Any) -> Sweep:
+    def swept(
+        what: str,
+        logs: Sequence[Measured],
+        settings: FitSettings = SETTINGS,
+        profile: Profile = PROFILE,
+        **options: Any,
+    ) -> Sweep:
         ready = {
             log.log: replace(
                 opened,
@@ -54,7 +61,7 @@ def run(monkeypatch: pytest.MonkeyPatch, opened: Opened) -> Run:
             for log in logs
         }
         monkeypatch.setattr(inputs, "open_track", lambda path, *_, **__: ready[path])
-        return sweep_settings(what, list(ready), PROFILE, settings, RUN, **options)
+        return sweep_settings(what, list(ready), profile, settings, RUN, **options)
 
     return swept
 
@@ -77,6 +84,27 @@ def test_every_combination_has_a_finite_score_and_the_choice_is_one_of_them(run:
     window = run("window", [measured(1, noise=50.0, jitter=0.02)], replace(SETTINGS, components=9), windows_s=windows_s)
     assert window.choice.components == 9
     assert window.choice.window == int(np.argmin(curves.normalised()[0][:, 8]))
+
+
+def test_an_axis_that_is_not_measured_is_not_judged(run: Run) -> None:
+    signals = tuple(
+        replace(one, fields=one.fields[:1], frame="FRD") if one.quantity == "velocity" else one
+        for one in PROFILE.signals
+    )
+    surge = replace(PROFILE, signals=signals)
+    assert not surge.measures_sway
+    found = run("components", [measured(1, noise=50.0, seconds=300.0)], replace(SETTINGS, weak_window_s=8.0), surge)
+    curves = found.choice.curves
+    assert np.isfinite(curves.normalised()[0]).all()
+    assert (curves.normalised()[0].min(axis=(0, 1)) >= 1.0).all()
+    assert not curves.base[1]
+    assert not curves.mse[..., 1].any()
+    assert np.isnan(found.choice.over_base[..., 1]).all()
+    (line,) = [one for one in render_sweep(found).splitlines() if one.startswith("* ")][:1]
+    assert "nan" not in line
+    assert "–" in line
+    page = html.unescape(render(found)[0])
+    assert not re.search(r"\bnan\b", page)
 
 
 @pytest.mark.slow

@@ -507,6 +507,12 @@ DATAFLASH_TEXT = "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\nATT
         ("a.tlog", (1693609000000000).to_bytes(8, "big") + b"\xfd\x1f\x00\x00" + bytes(60), "telemetry log of MAVLink"),
         ("a.ulg.gz", gzip.compress(b"ULog" * 100, mtime=0), "packed by gzip.*Fix: unpack it"),
         ("a.xlsx", b"PK\x03\x04\x14\x00\x06\x00" + bytes(22) + b"[Content_Types].xml" + bytes(90), "workbook.*as CSV"),
+        ("b.xlsx", b"PK\x03\x04" + bytes(26) + b"docProps/PK\x03\x04" + bytes(90), "workbook.*as CSV"),
+        (
+            "a.ods",
+            b"PK\x03\x04" + bytes(26) + b"mimetypeapplication/vnd.oasis.opendocument.spreadsheet" + bytes(90),
+            "workbook.*as CSV",
+        ),
     ],
     ids=lambda one: one if isinstance(one, str) and one.startswith("a.") else "",
 )

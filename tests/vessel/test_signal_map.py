@@ -301,6 +301,13 @@ def test_quaternion_with_offset() -> None:
     assert columns["psi"] == pytest.approx([math.radians(-5.0)])
 
 
+def test_surge_alone_has_no_sway_to_turn_in_a_port_positive_frame() -> None:
+    text = BODY.replace('fields = ["u", "v"]', 'fields = ["u"]')
+    columns = convert(profile(text), series("/nav", u=[2.0], r=[0.0]))
+    assert columns["u"] == pytest.approx([2.0 * 1852.0 / 3600.0])
+    assert "v" not in columns
+
+
 def test_commanded_force_in_kilonewtons_and_flu() -> None:
     text = BODY + (
         '[signals.tau_d]\ntopic = "/tau"\nfields = ["x", "y", "n"]\nunit = "kN"\nmoment_unit = "kN*m"\nframe = "FLU"\n'

@@ -30,7 +30,7 @@ from ferryid.regression import fit_simpls
 from ferryid.regression.bases import Basis
 from ferryid.regression.cross_validation import MOST_GROUPS, Curves
 from ferryid.signals.prepare import Opened, smoothed
-from ferryid.types import RunContext
+from ferryid.types import AXES, Floats, RunContext
 from ferryid.vessel.dimensions import window_seconds
 from ferryid.vessel.profile import Profile
 
@@ -265,14 +265,16 @@ def _select(
     fitted = functions.mask.any(axis=0)
     held = whole_data.without_force & fitted if settings.inertia == "auto" else np.zeros(3, dtype=bool)
     mask = without_inertia(functions.mask, functions.terms, held)
-    errors, base = [], []
+    judges = np.array([axis in settings.axes for axis in AXES])
+    errors, base = list[list[Floats]](), list[Floats]()
     for each, logs in lengths:
         for fold, test in tests:
             parts = trained_parts(logs, fold)
             data = WindowedData.of(profile, each, functions, logs, parts, parts)
             found = [test.errors(one) for one in _counts(data, replace(functions, mask=mask))]
-            errors.append([one.mse_model for one in found])
-            base.append(found[0].mse_base)
+            # An axis that is not measured has no error in any fold, its base model neither.
+            errors.append([np.where(judges, one.mse_model, 0.0) for one in found])
+            base.append(np.where(judges, found[0].mse_base, 0.0))
     rows = np.array([sum(len(one) for one in test.validation) for _, test in tests], dtype=np.float64)
     by_fold = np.array(errors).reshape(len(lengths), len(tests), len(functions.terms), 3)
     curves = Curves(

@@ -49,8 +49,15 @@ class Curves:
     def normalised(self) -> tuple[Floats, Floats]:
         """Return error and its standard error, each axis over its smallest error and averaged, shape (W, A) each."""
         least = self.mse.min(axis=(0, 1))
-        unit = np.where(least > 0.0, least, 1.0)
-        return (self.mse / unit).mean(axis=2), (self.standard_error / unit).mean(axis=2)
+        return self._mean(self.mse, least), self._mean(self.standard_error, least)
+
+    def _mean(self, values: Floats, least: Floats) -> Floats:
+        """Return the mean of values over the least error of their axis, shape (...).
+
+        An axis without any error, of the base model neither, is one that is not judged, and does not count.
+        """
+        axes = np.count_nonzero((self.mse.max(axis=(0, 1)) > 0.0) | (self.base > 0.0))
+        return np.asarray((values / np.where(least > 0.0, least, 1.0)).sum(axis=-1) / max(axes, 1))
 
     def near(self) -> Flags:
         """Return which combinations cannot be told from the best, shape (W, A).
@@ -61,7 +68,7 @@ class Curves:
         curve, own = self.normalised()
         window, count = np.unravel_index(int(np.argmin(curve)), curve.shape)
         least = self.mse.min(axis=(0, 1))
-        error = (self.by_fold / np.where(least > 0.0, least, 1.0)).mean(axis=3)
+        error = self._mean(self.by_fold, least)
         worse = error - error[window, :, count][None, :, None]
         folds = error.shape[1]
         band = np.std(worse, axis=1, ddof=1) / sqrt(folds) if folds > 1 else np.zeros_like(curve)
@@ -84,7 +91,7 @@ class Curves:
         which shrinks where the data say little: more components then cost nothing.
         """
         least = self.mse[0].min(axis=0)
-        error = (self.by_fold[0] / np.where(least > 0.0, least, 1.0)).mean(axis=2)
+        error = self._mean(self.by_fold[0], least)
         best = int(np.argmin(error.mean(axis=0)))
         worse = error - error[:, best : best + 1]
         band = np.std(worse, axis=0, ddof=1) / sqrt(len(error))
