@@ -14,6 +14,7 @@ from ferryid.errors import ReversedForcesError
 from ferryid.identify.contradictions import signs_of, unanswered, wrong_way
 from ferryid.identify.inertia.shares import relative_inertia, without_inertia
 from ferryid.identify.motion_data import LogData
+from ferryid.identify.propulsive_work import PropulsiveWork, propulsive_work
 from ferryid.identify.split import Split
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.weak_data import WeakData, weak_data
@@ -41,6 +42,8 @@ class ForceResponse:
         does not where a controller's answer to the motion is taken for its cause, or the unit of the force is wrong.
     share
         The base model's inertia over the rigid body's, shape (3,).
+    work
+        What the actuators do while the vessel keeps its way; None where that is not known, or of several logs.
     """
 
     response: Floats
@@ -48,6 +51,7 @@ class ForceResponse:
     sigmas: Floats
     possible: Flags
     share: Floats
+    work: PropulsiveWork | None = None
 
     @property
     def reversed(self) -> Floats:
@@ -86,7 +90,8 @@ def force_response(data: LogData) -> ForceResponse | None:
     weak = replace(weak, training_s=IDENTIFY.response_window * weak.windows.length_s)
     if weak.impossible or not all(name in data.functions.terms for name in ACCELERATIONS):
         return None
-    return _estimated(weak)
+    found = _estimated(weak)
+    return replace(found, work=propulsive_work(data.motions[0], data.profile)) if len(data.motions) == 1 else found
 
 
 def _estimated(weak: WeakData) -> ForceResponse:

@@ -188,6 +188,60 @@ class IdentifyThresholds:
         "in which the vessel clearly follows the force on an axis, from which another that does not is left out",
         "convention: of two logs that disagree neither is known to be right",
     )
+    least_work: float = threshold(
+        0.25,
+        "of the least in other logs",
+        "work of the actuators, with the way that is lost, at the same speed, below which a log of a vessel under way is odd",
+        "convention: wind, current and a wrong thrust curve change it by less",
+    )
+    lost_way: float = threshold(
+        2.0,
+        "-",
+        "factor on the kinetic energy of the rigid body that is lost in a log, as it may overcome resistance",
+        "derived: added mass in sway about equals the displacement",
+    )
+    ways_lost: float = threshold(
+        1.0,
+        "of the kinetic energy",
+        "work that other logs show to be needed, below which a log is too short to show that the vessel keeps its way",
+        "derived: without a drive a vessel has lost more than half of it then",
+    )
+    own_way: float = threshold(
+        0.6,
+        "of the motion along the bow",
+        "that turns with it, below which, or above as much more than all, a vessel may drift",
+        "tuned on simulated recordings: a tanker's course in zigzags turns by 0.7 of it, none of a drifting vessel",
+    )
+    most_aside: float = threshold(
+        0.5, "of the surge velocity", "sway velocity beyond which a vessel may drift", "convention: 27° of drift angle"
+    )
+    least_direct: float = threshold(
+        0.5,
+        "of its root mean square",
+        "mean surge velocity below which a vessel goes to and fro, and late orders do negative work",
+        "convention: half",
+    )
+    most_made_good: float = threshold(
+        0.5,
+        "of the surge velocity",
+        "mean velocity over ground up to which the course has turned round",
+        "convention: half; that of a drift is all of it",
+    )
+    fewest_swings: int = threshold(
+        3,
+        "swings",
+        "of the bow to one side and the other where the course has not turned round",
+        "convention: what drifts turns slowly, and its course may change with that once",
+    )
+    slowest_way: float = threshold(
+        0.5,
+        "of the median of other logs",
+        "speed below which it is not asked what drives a vessel",
+        "convention: wind and current move a slow one",
+    )
+    fewest_way_windows: int = threshold(
+        10, "windows", "in which the work of the actuators is judged", "convention: fewer have no scatter"
+    )
     opposite: float = threshold(
         0.2,
         "of what the base model expects",

@@ -11,6 +11,7 @@ from ferryid.effects.wording import listed
 from ferryid.identify.contradictions import signs_of
 from ferryid.identify.engagement.responses import pooled, unengaged
 from ferryid.identify.force_signs import ForceResponse
+from ferryid.identify.propulsive_work import undriven
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.types import AXES, Flags, Floats
 from ferryid.vessel.profile import Profile
@@ -30,9 +31,12 @@ _WITHOUT = (
 def odd_forces(responses: Mapping[str, ForceResponse | None], profile: Profile) -> dict[str, str]:
     """Return, of several logs, those that are left out as their forces act otherwise or not at all, and a sentence on each.
 
-    Parameters and result are those of `unlike_others` and `unengaged`.
+    Parameters and result are those of `unlike_others` and `unengaged`; of the others, those are left out too in which the
+    actuators do not do the work that it takes (`undriven`).
     """
-    return {**unlike_others(responses, profile), **unengaged(responses, profile)}
+    found = {**unlike_others(responses, profile), **unengaged(responses, profile)}
+    works = {path: one.work for path, one in responses.items() if path not in found and one is not None}
+    return {**undriven({path: one for path, one in works.items() if one is not None}), **found}
 
 
 def unlike_others(responses: Mapping[str, ForceResponse | None], profile: Profile) -> dict[str, str]:
