@@ -10,6 +10,7 @@ from ferryid.compiled import compiled
 from ferryid.effects.force_model import ForceModel, Measurements, check_actuators
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import AXES, Flags, Floats
+from ferryid.vessel.hull import current_in_body
 from ferryid.vessel.profile import Actuator, Profile
 from ferryid.vessel.thrusters import FRESH_WATER, thrust
 
@@ -27,6 +28,19 @@ def along(force_model: ForceModel | Measurements, k: int) -> Floats:
         cosine, sine = measurements.directions if known else (np.cos(angle), np.sin(angle))
         return np.asarray(part[:, 0] * cosine[:, k] + part[:, 1] * sine[:, k])
     return np.asarray(part[:, 0] * math.cos(actuator.angle_rad) + part[:, 1] * math.sin(actuator.angle_rad))
+
+
+def speed_along(measurements: Measurements, k: int) -> Floats:
+    """Return the velocity through the water of actuator `k` along its own direction, positive ahead [m/s], shape (n,)."""
+    nu, actuator = measurements.nu, measurements.profile.actuators[k]
+    if measurements.current is not None:
+        nu = nu - current_in_body(measurements.current, measurements.psi)
+    x, y = actuator.position_m
+    ahead, starboard = nu[:, 0] - nu[:, 2] * y, nu[:, 1] + nu[:, 2] * x
+    if actuator.kind == "azimuth":
+        cosine, sine = measurements.directions
+        return np.asarray(ahead * cosine[:, k] + starboard * sine[:, k])
+    return np.asarray(ahead * math.cos(actuator.angle_rad) + starboard * math.sin(actuator.angle_rad))
 
 
 def scaled(force_model: ForceModel, k: int, share: Floats) -> ForceModel:

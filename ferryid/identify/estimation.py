@@ -49,7 +49,7 @@ def estimate_correction(data: FitData, components: int, draws: int, progress: Ca
     blocks, block_s, notes = data.resampling_blocks(found, offset)
 
     def drawn(coefficients: Floats, intercepts: Floats) -> tuple[Floats, Floats]:
-        coefficients = data.scattered(coefficients)
+        coefficients = data.scattered(coefficients, functions.mask)
         return data.force_form(coefficients if feasible is None else feasible.moved(coefficients), intercepts)
 
     spread = bootstrap_coefficients(

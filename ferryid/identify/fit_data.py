@@ -131,8 +131,11 @@ class FitData(ABC):
         """Return estimated coefficients, shape (..., K, 3), and intercepts, (..., 3), as those of the applied force."""
         return coefficients, intercepts
 
-    def scattered(self, coefficients: Floats) -> Floats:
-        """Return coefficients of draws, (draws, K, 3), with the scatter that drawing rows again does not bring."""
+    def scattered(self, coefficients: Floats, mask: Flags) -> Floats:
+        """Return coefficients of draws, (draws, K, 3), with the scatter that drawing rows again does not bring.
+
+        `mask`, shape (K, 3), has those that are estimated: what is held has no scatter.
+        """
         return coefficients
 
     def feasible(self, coefficients: Floats, mask: Flags) -> Feasible | None:

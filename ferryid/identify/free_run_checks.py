@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ferryid.counts import counted
+from ferryid.effects.wording import listed
 from ferryid.identify.acceptance import Check
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.models.prediction import FreeRun, SingleRuns
@@ -96,9 +97,14 @@ def _at_horizon(
     clusters = _clusters(old, max(IDENTIFY.block_s, horizon_s))[paired]
     stretches = np.unique(clusters).size
     if stretches < 2:
+        worse = []
+        for label, which, unit, factor in known if stretches else ():
+            before, after = (float(one.errors[paired, column, which].mean()) * factor for one in (old, new))
+            if after > before:
+                worse.append(f"{label} {after:.3g} {unit} against {before:.3g}")
         reason = (
             f"Free runs of {horizon_s:g} s lie in {counted(stretches, 'held-out block')}, and their scatter is not known: "
-            "not compared there."
+            f"not compared there{f', where the new model errs more (mean {listed(worse)})' if worse else ''}."
         )
         return [_not_compared(f"free_run_{horizon_s:g}s", reason)]
     checks = []

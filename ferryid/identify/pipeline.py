@@ -23,7 +23,7 @@ from ferryid.identify.fit_warnings import free_run_warnings, rest_warnings, unus
 from ferryid.identify.force_signs import refuse_reversed_forces
 from ferryid.identify.free_run_checks import free_run_checks
 from ferryid.identify.held_out_checks import held_out_checks, skill_checks
-from ferryid.identify.inertia import why_too_light
+from ferryid.identify.inertia import undetermined, why_too_light
 from ferryid.identify.inputs import OddLogs, usable_logs
 from ferryid.identify.judged_split import judged_split
 from ferryid.identify.log_sums import folds_by_blocks, force_free_axes, sum_log
@@ -287,11 +287,12 @@ def accept_estimate(
     if data.held_out:
         acceptance = accept(scores.force.mse_base, scores.force.mse_model, scores.measure, data.settings.axes)
     if data.held_out and data.settings.accept == "full":
+        physical = physical_checks(told, stored)
         acceptance = acceptance.with_checks(
             (
-                *physical_checks(told, stored),
+                *physical,
                 *free_run_checks(free_base, free_new),
-                *skill_checks(scores.force),
+                *skill_checks(scores.force, undetermined(physical)),
                 *held_out_checks(scores.seconds, data.held_out_blocks, scores.split),
             )
         )

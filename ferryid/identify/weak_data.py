@@ -510,29 +510,32 @@ class WeakData(LogData):
         ]
         return blocks, block_s, notes
 
-    def scattered(self, gains: Floats) -> Floats:
+    def scattered(self, gains: Floats, mask: Flags) -> Floats:
         """Return drawn gains, (draws, K, 3), with the scatter of the prior: the truth is as far from its mean as it states.
 
         Drawing windows again leaves the prior where it is, so that what only the prior determines would have no interval, and
-        it leaves the winds of the logs where they are. Errors in variables that remain shift every draw alike.
+        it leaves the winds of the logs where they are. Errors in variables that remain shift every draw alike. An inertia that
+        is held is none of those that `mask` has, and scatters in nothing.
         """
         rng = np.random.default_rng(self.settings.seed)
         information, out = self.information, gains.copy()
         for axis in range(3):
-            own = np.flatnonzero(self.functions.mask[:, axis] & np.isfinite(self.prior_spread[:, axis]))
-            every = np.flatnonzero(self.functions.mask[:, axis])
+            own = np.flatnonzero(mask[:, axis] & np.isfinite(self.prior_spread[:, axis]))
+            every = np.flatnonzero(mask[:, axis])
             spread = self.prior_factor * self.prior_spread[own, axis]
             covariance = np.linalg.pinv(information[axis][np.ix_(every, every)], hermitian=True)
             pulls = rng.standard_normal((len(gains), len(own))) / spread
             out[:, every, axis] += pulls @ covariance[np.searchsorted(every, own)]
+            added = self.condition_covariance[axis]
+            held = np.flatnonzero(self.functions.mask[:, axis] & ~mask[:, axis])
+            # Conditions were estimated with all of them free: what they share with those that are held is not left.
+            shared = added[np.ix_(held, every)]
+            left = shared.T @ np.linalg.pinv(added[np.ix_(held, held)], hermitian=True) @ shared
             out[:, every, axis] += rng.standard_normal((len(gains), len(every))) @ _root(
-                self.condition_covariance[axis][np.ix_(every, every)]
+                added[np.ix_(every, every)] - left
             )
             own_inertia = ACCELERATIONS[axis]
-            if (
-                own_inertia in self.functions.terms
-                and self.functions.mask[row := self.functions.terms.index(own_inertia), axis]
-            ):
+            if own_inertia in self.functions.terms and mask[row := self.functions.terms.index(own_inertia), axis]:
                 out[:, row, axis] += IDENTIFY.inertia_error * rng.standard_normal(len(gains))
         return out
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from ferryid.compare import Coefficient, CommonErrors, ComparedLog, ComparisonResult
@@ -51,6 +51,7 @@ def render(
                 "figures": _figures(result, logs[place]) if place is not None else [],
             }
         )
+    fitted = comparison_words.estimated(result)
     page = template("compare.html").render(
         title=" · ".join([result.vessel, *(model.label for model in result.models if not model.is_base)]),
         headline=comparison_words.headline(result),
@@ -63,8 +64,10 @@ def render(
         about_p=comparison_words.about_errors(result) if known else "",
         omitted=f"Not drawn, but part of every number: {', '.join(left)}." if left else "",
         labels=labels,
-        coefficients=[_row(*row, labels) for row in comparison_words.coefficient_table(result)],
-        terms=[_row(f"{row.term} in {row.axis}", row.unit, row.values, labels) for row in result.coefficients.terms],
+        coefficients=[_row(*row, labels, fitted) for row in comparison_words.coefficient_table(result)],
+        terms=[
+            _row(f"{row.term} in {row.axis}", row.unit, row.values, labels, fitted) for row in result.coefficients.terms
+        ],
         effects=[line.strip() for line in render_effects(result.effects)],
     )
     figures = [*overall, *(figure for section in sections for figure in section["figures"])]
@@ -122,5 +125,8 @@ def _figures(result: ComparisonResult, log: ComparedLog) -> list[dict[str, Any]]
     return found
 
 
-def _row(name: str, unit: str, values: Mapping[str, Coefficient], labels: Sequence[str]) -> dict[str, Any]:
-    return {"name": name, "unit": unit, "cells": [comparison_words.cell(values.get(label)) for label in labels]}
+def _row(
+    name: str, unit: str, values: Mapping[str, Coefficient], labels: Sequence[str], fitted: Collection[str]
+) -> dict[str, Any]:
+    cells = [comparison_words.cell(values.get(label), of_fit=label in fitted) for label in labels]
+    return {"name": name, "unit": unit, "cells": cells}

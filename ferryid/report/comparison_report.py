@@ -69,9 +69,9 @@ def as_text(result: ComparisonResult) -> str:
 
 def _coefficient_table(result: ComparisonResult) -> list[str]:
     """Return the coefficients of every model, with their intervals where there is room for them."""
-    narrow = len(result.labels) <= NARROW
+    narrow, fitted = len(result.labels) <= NARROW, comparison_words.estimated(result)
     cells = {
-        label: [_with_interval(row.values[label], narrow) for row in result.coefficients.physical]
+        label: [_with_interval(row.values[label], narrow, label in fitted) for row in result.coefficients.physical]
         for label in result.labels
     }
     columns = {label: max(12, 2 + max(map(len, (label, *column)))) for label, column in cells.items()}
@@ -79,12 +79,14 @@ def _coefficient_table(result: ComparisonResult) -> list[str]:
     for number, row in enumerate(result.coefficients.physical):
         line = "".join(f"{cells[label][number]:>{width}}" for label, width in columns.items())
         lines.append(f"  {row.coefficient:<16}{line}  {row.unit}")
-    also = "In parentheses: 95 % intervals. T" if narrow else "Intervals, and t"
+    held = f"; {comparison_words.HELD}: not estimated, as in the profile"
+    shown = any(comparison_words.HELD in one for column in cells.values() for one in column)
+    also = f"In parentheses: 95 % intervals{held if shown else ''}. T" if narrow else "Intervals, and t"
     return [*lines, f"{also}erms that are no hull's, such as wind and the constant: in the report."]
 
 
-def _with_interval(one: Coefficient | None, shown: bool) -> str:
-    value, interval = comparison_words.cell(one)
+def _with_interval(one: Coefficient | None, shown: bool, of_fit: bool) -> str:
+    value, interval = comparison_words.cell(one, of_fit=of_fit)
     return f"{value} ({interval})" if shown and interval else value
 
 

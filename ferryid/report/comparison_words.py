@@ -338,12 +338,31 @@ def coefficient_table(result: ComparisonResult) -> list[Values]:
     return rows
 
 
-def cell(one: Coefficient | None) -> tuple[str, str]:
-    """Return a coefficient and its interval as text; a dash for one that a model does not have."""
+HELD = "held"
+"""In the place of the interval of a coefficient that a fit did not estimate."""
+
+
+def estimated(result: ComparisonResult) -> frozenset[str]:
+    """Return the labels of the models whose coefficients have intervals: what has none in them was held, as in the profile."""
+    known = result.coefficients
+    every = (*(row.values for row in known.physical), *(row.values for row in known.terms))
+    return frozenset(label for values in every for label, one in values.items() if _has_interval(one))
+
+
+def _has_interval(one: Coefficient) -> bool:
+    return isfinite(one.low) and isfinite(one.high) and one.low != one.high
+
+
+def cell(one: Coefficient | None, *, of_fit: bool = False) -> tuple[str, str]:
+    """Return a coefficient and its interval as text; a dash for one that a model does not have.
+
+    `of_fit` is whether the others of its model have intervals: then one without any was held.
+    """
     if one is None or (one.value == 0.0 and not any(isfinite(end) and end != 0.0 for end in (one.low, one.high))):
         return "–", ""
-    known = isfinite(one.low) and isfinite(one.high) and one.low != one.high
-    return number(one.value, ".4g"), f"{number(one.low, '.4g')} to {number(one.high, '.4g')}" if known else ""
+    if not _has_interval(one):
+        return number(one.value, ".4g"), HELD if of_fit else ""
+    return number(one.value, ".4g"), f"{number(one.low, '.4g')} to {number(one.high, '.4g')}"
 
 
 def _constant(term: str) -> str:

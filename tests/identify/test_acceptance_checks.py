@@ -14,7 +14,7 @@ from ferryid.identify import inputs
 from ferryid.identify.acceptance import Check
 from ferryid.identify.free_run_checks import free_run_checks, paired_interval
 from ferryid.identify.held_out_checks import held_out_checks, skill_checks
-from ferryid.identify.inertia import inertia_checks
+from ferryid.identify.inertia import inertia_checks, undetermined
 from ferryid.identify.inertia.shares import rigid_body
 from ferryid.identify.physical_checks import damping_checks
 from ferryid.identify.pipeline import fit_logs
@@ -70,6 +70,8 @@ def at_upper_bound_in_yaw(*shares: float) -> Check:
 def test_an_inertia_that_the_data_leave_open_below_its_bound_does_not_reject() -> None:
     check = at_upper_bound_in_yaw(3.0, 12.0)
     assert check.passed is None
+    assert undetermined([check]) == ("yaw",)
+    assert undetermined([at_upper_bound_in_yaw(3.0, 40.0)]) == ()
     assert "the data do not determine it" in check.reason
     assert f"acceleration the moment with {3.0 * RIGID[2, 2]:.3g} kg·m², and the truth lies between" in check.reason
     # A force that hardly shows in the motion at all leaves everything open, and so does a mirrored one.
@@ -203,6 +205,11 @@ def test_what_cannot_be_compared_is_told_and_decides_nothing() -> None:
     checks = free_run_checks(one, runs(np.full((1, 3), 9.0)))
     assert not failed(checks)
     assert [check.name for check in checks if check.passed is None] == [f"free_run_{h:g}s" for h in HORIZONS]
+    assert checks[-1].reason.endswith(
+        "not compared there, where the new model errs more (mean position 9 m against 1, heading 516 deg against 57.3 and "
+        "yaw rate 516 deg/s against 57.3)."
+    )
+    assert free_run_checks(one, one)[-1].reason.endswith("not compared there.")
     short = runs(np.ones((12, 1)))
     (missing,) = (check for check in free_run_checks(short, short) if check.passed is None)
     assert "30 s or 60 s" in missing.reason
@@ -261,6 +268,11 @@ def test_a_model_is_held_against_a_velocity_that_does_not_change() -> None:
     assert "is 0.997 times that of a velocity that does not change" in nearly.reason
     (even,) = judged(1.0, 1.0, 1.0)
     assert even.value == pytest.approx(1.0), "half of one is as much as twice of another"
+    for still, passed in ((1.1, True), (1.0, False)):
+        _, yaw = skill_checks(replace(force, mse_constant_velocity=np.array([1.0, 4.0, still])), ("yaw",))
+        assert (yaw.name, yaw.passed) == ("constant_velocity_yaw", passed)
+        assert yaw.value == pytest.approx(1.0 / still)
+        assert ("check inertia_z or k_zz_m" in yaw.reason) != passed
     (without_sway,) = judged(1.0, np.nan, 2.0)
     assert without_sway.value == pytest.approx(0.5)
     assert judged(np.nan, np.nan, np.nan) == ()

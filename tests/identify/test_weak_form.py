@@ -21,7 +21,7 @@ from ferryid.identify.contradictions import signs_of, wrong_size, wrong_way
 from ferryid.identify.estimation import estimate_correction
 from ferryid.identify.feasible import Feasible, _nearest, feasible_gains
 from ferryid.identify.inertia import checks as inertia_checks_module
-from ferryid.identify.inertia.shares import relative_inertia
+from ferryid.identify.inertia.shares import relative_inertia, without_inertia
 from ferryid.identify.motion_data import compute_residuals
 from ferryid.identify.physical_checks import physical_checks
 from ferryid.identify.pipeline import fit_logs
@@ -512,12 +512,17 @@ def test_what_only_the_prior_determines_has_its_spread() -> None:
         return replace(one, nu=one.nu * keep, tau=one.tau * keep)
 
     data = data_of([straight(measured(seed, seconds=300.0, jitter=0.02)) for seed in range(2)])
-    drawn = data.scattered(np.zeros((4000, K, 3)))
+    drawn = data.scattered(np.zeros((4000, K, 3)), data.functions.mask)
     r = BASIS.terms.index("r")
     assert drawn[:, r, 2].std() == pytest.approx(data.prior_factor * data.prior_spread[r, 2], rel=0.1)
     # In surge the data leave less of it.
     u = BASIS.terms.index("u_dot")
     assert drawn[:, u, 0].std() < 0.2 * data.prior_spread[u, 0]
+    # An inertia that is held has none, nor has what goes with it on its axis.
+    held = without_inertia(data.functions.mask, BASIS.terms, np.array([False, True, False]))
+    drawn = data.scattered(np.zeros((4, K, 3)), held)
+    assert not drawn[:, [BASIS.terms.index(name) for name in ("v_dot", "r_dot")], 1].any()
+    assert drawn[:, BASIS.terms.index("v"), 1].all()
 
 
 @pytest.mark.parametrize("spread", [0.05, 0.8])

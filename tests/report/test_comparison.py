@@ -10,6 +10,8 @@ import pytest
 
 from ferryid.compare.candidates import BASE
 from ferryid.compare.comparison_result import (
+    Coefficient,
+    CoefficientRow,
     Coefficients,
     ComparedModel,
     ComparisonResult,
@@ -23,6 +25,7 @@ from ferryid.compare.comparison_statements import PairedErrors, comparison_state
 from ferryid.regression.resampling.paired_bootstrap import PairedRatios, compare_pairs
 from ferryid.report import comparison_words
 from ferryid.report.comparison_figures import looks, over_reference
+from ferryid.report.comparison_report import _coefficient_table
 
 HORIZONS = (5.0, 30.0)
 
@@ -252,3 +255,19 @@ def test_nor_is_it_where_it_may_be_better() -> None:
     (row, *_) = result(("one", "two"), 0.03, frozenset({"one"})).statements
     assert row.perhaps == "one"
     assert row.sentence.endswith("; no evidence, as one was fitted to this log")
+
+
+def test_what_a_fit_did_not_estimate_is_held_and_has_no_interval() -> None:
+    here = {"one": Coefficient(30.0, 20.0, 40.0), "none": Coefficient(28.0, nan, nan)}
+    held = {"one": Coefficient(15.0, nan, nan), "none": Coefficient(15.0, nan, nan)}
+    rows = (CoefficientRow("m11", "kg", here), CoefficientRow("m22", "kg", held))
+    found = replace(result(("one", "none"), 0.5), coefficients=Coefficients(rows, ()))
+    # A model without any interval, such as a base model, says nothing of what it estimated.
+    assert comparison_words.estimated(found) == {"one"}
+    text = "\n".join(_coefficient_table(found))
+    assert "15 (held)" in text
+    assert text.count("held: not estimated, as in the profile") == 1
+    assert text.count("(held)") == 1
+    assert comparison_words.cell(held["one"], of_fit=True) == ("15", "held")
+    assert comparison_words.cell(held["none"]) == ("15", "")
+    assert "held" not in "\n".join(_coefficient_table(replace(found, coefficients=Coefficients(rows[:1], ()))))

@@ -50,6 +50,8 @@ class Figures:
         Of a disturbance in a narrow band that acts in a span, how many of its periods that holds.
     single_visit
         True where the vessel was only once in the place in which it acts.
+    regime
+        How its actuator works in its span as nowhere else in the log, as a clause; empty where it does so at other times too.
     passes
         Of what begins and ends within the log, its size over the one that hull and formulas may be off by.
     power_in_velocities
@@ -87,6 +89,7 @@ class Figures:
     block_s: float = 0.0
     cycles: float = inf
     single_visit: bool = False
+    regime: str = ""
     passes: float = inf
     power_in_velocities: float = inf
     gain: float = inf

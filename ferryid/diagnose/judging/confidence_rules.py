@@ -232,6 +232,19 @@ def place_visited_once(finding: Finding, context: Context, _threshold: float) ->
     )
 
 
+@rule(of_name=True)
+def regime_of_one_span(finding: Finding, context: Context, _threshold: float) -> Outcome:
+    """Lower what an actuator lacks in a span in which it works as at no other time: its curve may be off there.
+
+    See `ferryid.diagnose.judging.onset_evidence.regime_of_span`.
+    """
+    if not context.own.regime:
+        return finding, ""
+    return _because(
+        finding, f"{context.own.regime}, as nowhere else in the log: its thrust curve there may be what is off"
+    )
+
+
 @rule(JUDGING.least_passing, "times what hull and formulas may be off by in a part of the manoeuvres")
 def passes_by_little(finding: Finding, context: Context, threshold: float) -> Outcome:
     """Lower what both begins and ends within the log and is smaller than this; what is too brief has its own rule."""
@@ -533,6 +546,7 @@ RULES: tuple[ConfidenceRule, ...] = (
     improves_no_claimed_axis,
     too_brief,
     place_visited_once,
+    regime_of_one_span,
     passes_by_little,
     worse_on_an_axis,
     worse_in_free_runs,

@@ -37,7 +37,7 @@ from ferryid.diagnose.judging.finding import Finding, Rival
 from ferryid.diagnose.judging.held_out import Proof
 from ferryid.diagnose.judging.locate import locate
 from ferryid.diagnose.judging.motion_evidence import beyond_any_hull
-from ferryid.diagnose.judging.onset_evidence import sets_in
+from ferryid.diagnose.judging.onset_evidence import regime_of_span, sets_in
 from ferryid.diagnose.judging.size_estimates import size_estimates
 from ferryid.diagnose.judging.time_posterior import TimePosterior
 from ferryid.effects.force_model import Measurements
@@ -187,6 +187,7 @@ def _figures(
         lasts_s=lasts_s(problem, candidate) if candidate.times else inf,
         block_s=block_s(problem.windows),
         single_visit=candidate.effect.single_visit(problem.plain.measurements, values),
+        regime=regime_of_span(problem.plain.measurements, candidate),
         passes=passes,
         doubt=value_doubt(candidate.effect, candidate.parameters, reported, problem.plain.measurements.profile)
         or candidate.effect.doubt_where(reported, problem.plain.measurements),

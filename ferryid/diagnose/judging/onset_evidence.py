@@ -2,7 +2,7 @@
 
 A hull that nobody knows can stand in for most of what acts all along: a weak propeller, for one, is less drag. It does not
 change from one moment to the next. What does is known by that, where it is large, happens once, and is not the water or the
-hull that changed.
+hull that changed. Nor is it the actuator that changed where it works in another regime just then.
 """
 
 from __future__ import annotations
@@ -24,7 +24,12 @@ from ferryid.diagnose.inference.estimation import (
 from ferryid.diagnose.inference.folds import block_s
 from ferryid.diagnose.inference.onset_estimation import is_brief, largest_gain, lasts_s, linearise, replace_candidate
 from ferryid.diagnose.inference.thresholds import INFERENCE
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
+from ferryid.effects.actuator_force import along, index_of, speed_along
+from ferryid.effects.force_model import Measurements
+from ferryid.effects.thresholds import EFFECTS
+from ferryid.types import Flags, Floats
 
 
 def sets_in(problem: EstimationProblem, kept: Fit, index: int) -> bool:
@@ -61,6 +66,44 @@ def sets_in(problem: EstimationProblem, kept: Fit, index: int) -> bool:
         return False
     beside = largest_gain(problem, linearise(problem, kept, starting_point(problem, kept)), candidate)
     return own > INFERENCE.contrast * max(beside, 0.0)
+
+
+def regime_of_span(measurements: Measurements, candidate: Candidate) -> str:
+    """Return how an actuator works in the span of a candidate as it does at no other time, as a clause; else nothing.
+
+    A propeller that is reversed at speed, or runs at a speed far above any other, may give another thrust than its curve
+    says without being weaker than before. A regime is a direction of the force with a velocity through the water along it.
+    It is of the span alone where the actuator pushes that way in less than `EFFECTS.acting_share` of the log outside of it,
+    or where the velocity is beyond those out there, rest included, by `JUDGING.regime_margin` of the largest: what a
+    weak thruster itself does to the speed is less. It has to hold for `JUDGING.regime_share` of the squared force in the span.
+    """
+    if not candidate.times or candidate.instance not in measurements.names:
+        return ""
+    usable, k = measurements.usable, index_of(measurements, candidate.instance)
+    push, speed, t = along(measurements, k)[usable], speed_along(measurements, k)[usable], measurements.t[usable]
+    works = np.abs(push) > EFFECTS.acting_force * float(np.max(np.abs(push), initial=0.0))
+    within = (t >= candidate.onset_s) & (t < candidate.offset_s)
+    if not (works & within).any():
+        return ""
+    new = np.zeros(len(t), dtype=bool)
+    for way in (push > 0.0, push < 0.0):
+        here, elsewhere = works & way & within, works & way & ~within
+        new |= here & _beyond(speed, elsewhere, float(np.max(np.abs(speed[works]))))
+    power = push**2
+    if power[new].sum() < JUDGING.regime_share * power[works & within].sum():
+        return ""
+    pushes, moves = float(power[new] @ np.sign(push[new])), float(np.median(speed[new]))
+    ways = ["ahead" if one > 0.0 else "astern" for one in (pushes, moves)]
+    return f"in its span {candidate.instance} pushes {ways[0]} at {abs(moves):.2g} m/s {ways[1]} through the water"
+
+
+def _beyond(speed: Floats, rows: Flags, largest: float) -> Flags:
+    """Return which speeds are far from those of some rows; all where there are too few of these."""
+    if np.mean(rows) < EFFECTS.acting_share:
+        return np.ones(len(speed), dtype=bool)
+    low, high = np.quantile(speed[rows], [EFFECTS.acting_share, 1.0 - EFFECTS.acting_share])
+    margin = JUDGING.regime_margin * largest
+    return np.asarray((speed < min(low, 0.0) - margin) | (speed > max(high, 0.0) + margin))
 
 
 def _changed_damping(problem: EstimationProblem, candidate: Candidate) -> list[Candidate]:

@@ -238,6 +238,18 @@ class JudgingThresholds:
         "least size of an effect that both begins and ends within a log",
         "tuned on cases of `ferryid prove`: a thruster 5 % stronger for a minute was named; the uncertainty is each effect's",
     )
+    regime_share: float = threshold(
+        0.5,
+        "of the squared force in the span",
+        "share that an actuator gives in a regime of no other time for what it lacks in a span to be a hint",
+        "convention: the larger part",
+    )
+    regime_margin: float = threshold(
+        0.5,
+        "of the largest speed along the actuator",
+        "by how much a speed is beyond those of other times to be another regime",
+        "derived: speed goes about with the root of the thrust: one that is halved or doubled changes it by less",
+    )
     credible_move: float = threshold(
         10.0,
         "standard deviations of the prior",

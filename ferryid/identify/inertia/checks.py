@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ferryid.effects.wording import listed
@@ -117,6 +119,11 @@ def inertia_checks(profile: Profile, mass: Floats, spans: Floats | None = None) 
             )
         )
     return tuple(checks)
+
+
+def undetermined(checks: Sequence[Check]) -> tuple[str, ...]:
+    """Return the axes of which `inertia_checks` leave open whether their inertia, held at its upper bound, is possible."""
+    return tuple(axis for axis in AXES for one in checks if one.name == f"inertia_{axis}" and one.passed is None)
 
 
 def _span(span: Floats, axis: str) -> tuple[str, float]:

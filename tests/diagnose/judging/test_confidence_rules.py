@@ -37,6 +37,7 @@ from ferryid.diagnose.judging.confidence_rules import (
     place_visited_once,
     pose_jumps,
     predictive,
+    regime_of_one_span,
     removes_little,
     seen_by_one_sensor,
     too_brief,
@@ -69,7 +70,7 @@ def on(kind: Kind, **figures: object) -> Context:
 
 def test_every_rule_has_a_name_a_line_and_its_unit() -> None:
     names = [one.name for one in RULES]
-    assert len(names) == len(set(names)) == 28
+    assert len(names) == len(set(names)) == 29
     for one in RULES:
         assert one.about.endswith((".", ":", ",")) or one.about, one.name
         assert (one.threshold is None) == (one.unit == ""), one.name
@@ -214,6 +215,15 @@ def test_what_acts_for_less_than_two_blocks_is_a_hint() -> None:
 def test_what_acts_in_a_place_that_was_visited_once_is_a_hint() -> None:
     assert stands(place_visited_once, found("mooring"), on("force"))
     assert not stands(place_visited_once, found("mooring"), on("force", single_visit=True))
+
+
+def test_what_an_actuator_lacks_in_a_regime_of_one_span_is_a_hint() -> None:
+    weak = replace(found("thruster_gain"), instance="left")
+    assert stands(regime_of_one_span, weak, on("force"))
+    assert regime_of_one_span(weak, on("force", regime="in its span left pushes astern at 2 m/s ahead"))[1] == (
+        "Thruster force (left) is a hint: in its span left pushes astern at 2 m/s ahead, as nowhere else in the log: its "
+        "thrust curve there may be what is off."
+    )
 
 
 def test_what_comes_and_goes_by_little_is_a_hint() -> None:

@@ -12,11 +12,14 @@ from ferryid.diagnose.data.measurements import window_lengths
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, estimation_problem, fit
 from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.diagnose.inference.weak_form import windows
-from ferryid.diagnose.judging.onset_evidence import sets_in
+from ferryid.diagnose.judging.onset_evidence import regime_of_span, sets_in
 from ferryid.effects import effects
+from ferryid.effects.actuator_force import speed_along
 from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.effects.hull_spread import default_hull_spread
+from ferryid.types import Floats
 from tests.diagnose.trials import FERRY, sailed
+from tests.effects.test_actuator_force import turning, vessel
 
 SCENARIO = """
 schema = "ferryid.scenario/1"
@@ -85,3 +88,45 @@ def test_a_force_all_along_that_lacks_the_first_minute_does_not_set_in(tmp_path:
     made = fit(case, [replace(mooring, onset_s=60.0)])
     assert made.values[0][:2] == pytest.approx([10.0, 10.0], abs=4.0)
     assert not sets_in(case, made, 0)
+
+
+def regime(speeds: Floats, ahead_mps: Floats, onset_s: float = 50.0) -> str:
+    """Return what is said of the first propeller in 100 s with these speeds [rpm] and velocities ahead [m/s]."""
+    measurements = turning(speeds).measurements
+    nu = np.column_stack([ahead_mps, np.zeros((len(speeds), 2))])
+    gain = Candidate.of(effects()["thruster_gain"], "port", vessel())
+    return regime_of_span(replace(measurements, nu=nu, nu_raw=nu), replace(gain, onset_s=onset_s))
+
+
+def test_a_propeller_that_is_reversed_at_speed_in_the_span_alone_is_in_another_regime() -> None:
+    late = 0.1 * np.arange(1000) >= 50.0
+    ahead = np.full(1000, 2.0)
+    reversed_late = np.where(late, -600.0, 600.0)
+    told = "in its span port pushes astern at 2 m/s ahead through the water"
+    assert regime(reversed_late, ahead) == told
+    # Astern at rest before is not astern at speed; astern at speed before is.
+    rows = np.arange(1000)
+    assert regime(np.where(rows < 100, -600.0, reversed_late), np.where(rows < 100, 0.0, 2.0)) == told
+    assert regime(np.where(rows < 100, -600.0, reversed_late), ahead) == ""
+    # Most of the squared force has to be of that regime, and there has to be a span.
+    assert regime(np.where(rows < 800, 600.0, -600.0), ahead) == ""
+    assert regime(reversed_late, ahead, onset_s=0.0) == ""
+    # No force in the span is none of another regime.
+    assert regime(np.where(late, 0.0, 600.0), ahead) == ""
+
+
+@pytest.mark.parametrize(("before", "after", "new"), [(1.0, 1.9, False), (0.9, 2.0, True), (2.0, 0.0, False)])
+def test_a_speed_far_above_any_other_is_another_regime_and_one_that_a_weak_thruster_makes_is_none(
+    before: float, after: float, new: bool
+) -> None:
+    speed = np.where(0.1 * np.arange(1000) >= 50.0, after, before)
+    assert (regime(np.full(1000, 600.0), speed) != "") == new
+
+
+def test_the_speed_of_a_regime_is_that_of_the_actuator_through_the_water() -> None:
+    measurements = turning(np.full(2, 600.0)).measurements
+    nu = np.array([[1.0, 0.5, 0.0], [0.0, 0.0, 0.1]])
+    measurements = replace(measurements, nu=nu, current=np.array([[0.3, 0.2], [0.0, 0.0]]))
+    # Port lies 1 m to port, the bow's tunnel 2 m ahead of midship and pushes to starboard.
+    assert speed_along(measurements, 0) == pytest.approx([0.7, 0.1])
+    assert speed_along(measurements, 2) == pytest.approx([0.3, 0.2])
