@@ -61,6 +61,7 @@ def ended(seed: int, monkeypatch: pytest.MonkeyPatch) -> tuple[int, bool]:
         "_fallen": fallen,
         "_standings": standings,
         "_sizes": lambda _problem, _kept, _index: "",
+        "least_gain": lambda _problem, _kept, _index, _rival: -1.0 if random.random() < 0.2 else 0.0,
         "with_both": with_both,
         "without": without,
         "prune": lambda _problem, kept: kept,
