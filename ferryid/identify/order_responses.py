@@ -221,9 +221,28 @@ class _Problem:
         price = 0.5 * log(len(self.at_once))
         worth = {one: self.gain(one) - price * np.count_nonzero(one) for one in (lag, delay, both)}
         best = max(worth, key=lambda one: worth[one])
-        if worth[best] <= 0.0 or max(best) >= longest_s or not self._is_shown(best):
+        if worth[best] <= 0.0 or max(best) >= longest_s or not self._is_shown(best) or self._goes_against(best):
             return None
         return best
+
+    def _goes_against(self, times: Times) -> bool:
+        """Tell whether the vessel accelerates against the applied force on an axis if orders are followed by these times.
+
+        Where it hunts, half of its period looks like a delay, and the force then has the wrong sign.
+        """
+        table, mask, terms = self.table(times), self.data.functions.mask, self.data.functions.terms
+        _, filters = self.left(times)
+        for axis, own in zip(self.axes, filters, strict=True):
+            columns = np.flatnonzero(np.concatenate([mask[:, axis], np.ones(3, dtype=bool)]))
+            white = self.whitened(np.column_stack([table[:, columns], self.acceleration[:, axis]]), own)
+            A, b = white[:, :-1], white[:, -1]
+            gains = np.linalg.lstsq(A, b, rcond=1e-10)[0]
+            variance = float(np.mean((b - A @ gains) ** 2))
+            place = columns.tolist().index(terms.index(ACCELERATIONS[axis]))
+            error = sqrt(variance * float(np.linalg.pinv(A.T @ A, hermitian=True)[place, place]))
+            if gains[place] < -IDENTIFY.wrong_way_sigmas * error:
+                return True
+        return False
 
     def _refined(self, times: Times, step: float, longest_s: float) -> Times:
         """Return the best times near some that are right to a factor `step`."""

@@ -65,6 +65,11 @@ def test_nothing_is_said_of_orders_that_are_followed_at_once(trials: dict[str, P
     assert responses(trials["at once"]) == ()
 
 
+def test_no_response_is_said_of_orders_that_the_vessel_goes_against(trials: dict[str, Path]) -> None:
+    """Of propellers whose sign is wrong the lag would be right, and a fit says at length what is wrong."""
+    assert responses(trials["lag"], "sign = -1") == ()
+
+
 def test_nothing_is_estimated_of_what_is_stated_or_measured(
     trials: dict[str, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
