@@ -36,6 +36,11 @@ def counted(number: int, noun: str) -> str:
     return f"{number} {plural(number, noun)}"
 
 
+def all_counted(number: int, noun: str) -> str:
+    """Return all of a number of things: ``all_counted(3, "log")`` is "all 3 logs", ``all_counted(2, "log")`` "both logs"."""
+    return f"both {plural(number, noun)}" if number == 2 else f"all {counted(number, noun)}"
+
+
 def per_cent(share: float) -> str:
     """Return a share in two digits, without a power of ten from 0.01 % on.
 

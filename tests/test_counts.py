@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from ferryid.counts import counted, per_cent, plural, verb
+from ferryid.counts import all_counted, counted, per_cent, plural, verb
 
 ROOT = Path(__file__).resolve().parents[1]
 NOUNS = (
@@ -63,6 +63,11 @@ def _counts(path: Path) -> Iterator[str]:
 )
 def test_a_number_has_its_noun(number: int, noun: str, said: str) -> None:
     assert counted(number, noun) == said
+
+
+def test_two_of_two_are_both() -> None:
+    assert all_counted(2, "log") == "both logs"
+    assert all_counted(3, "log") == "all 3 logs"
 
 
 def test_verbs_agree() -> None:

@@ -10,7 +10,7 @@ from math import exp, inf
 
 import numpy as np
 
-from ferryid.counts import counted, verb
+from ferryid.counts import all_counted, counted, verb
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit
 from ferryid.diagnose.inference.campaign_model import Campaign
@@ -170,7 +170,7 @@ class PropertyTest:
         says = effect.says({name: one.value for name, one in self.estimates.items()}, self.candidate.instance)
         held, able = self.holding
         logs = able if self.logs is None else self.logs
-        says += f" That is estimated from all {counted(logs, 'log')} together; "
+        says += f" That is estimated from {all_counted(logs, 'log')} together; "
         those = "them" if able == logs else "these"
         says += f"{able} of them can show it, and " if able < logs else ""
         says += f"on held-out stretches {held} of {those} {verb(held, 'is')} predicted better with it."

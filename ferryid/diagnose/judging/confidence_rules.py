@@ -16,7 +16,7 @@ from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.claims import Claim, Figures, Key, LogFigures
 from ferryid.diagnose.judging.credibility import worsened
 from ferryid.diagnose.judging.experiment_design import HULL_FIRST, fitting, manoeuvre
-from ferryid.diagnose.judging.finding import Finding
+from ferryid.diagnose.judging.finding import UNKNOWN, Finding
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
 from ferryid.effects.wording import IS_A_HINT, listed, titled
@@ -85,6 +85,8 @@ def lowered(finding: Finding, *unresolved: str, manoeuvre: str | None = None) ->
 
 def title_of(finding: Finding) -> str:
     """Return the title of a finding's effect, with the thruster that it is one of."""
+    if finding.effect == UNKNOWN:
+        return "The force without a name"
     known = effects().get(finding.effect)
     return titled(known.title if known else finding.effect.replace("_", " ").capitalize(), finding.instance)
 

@@ -8,7 +8,7 @@ from math import isfinite
 
 import numpy as np
 
-from ferryid.counts import counted
+from ferryid.counts import all_counted
 from ferryid.diagnose.data.measurements import window_lengths
 from ferryid.diagnose.inference.campaign_estimation import estimate_campaign
 from ferryid.diagnose.inference.campaign_logs import Member
@@ -60,7 +60,7 @@ class HiddenGain:
 
     def says(self, signal: str) -> str:
         """Return it as a sentence."""
-        where = "Held out" if self.logs == 1 else f"Held out over all {counted(self.logs, 'log')}"
+        where = "Held out" if self.logs == 1 else f"Held out over {all_counted(self.logs, 'log')}"
         told = f"{where}, the {signal} as it was measured gains {_range(self.measured)}"
         estimated = f"the estimated one, steady in each log, {_range(self.estimated)}"
         if not isfinite(self.share):

@@ -12,7 +12,7 @@ from math import exp
 
 import numpy as np
 
-from ferryid.counts import counted, per_cent
+from ferryid.counts import all_counted, per_cent
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.candidate_terms import FORCE, Term
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fit, fitted_force_model, rest_of
@@ -80,7 +80,7 @@ def find_unexplained(
     folds = problem.folds
     after, refitted = kept, problem
     if folds is not None and laws is not None and (common := laws.common(problem, kept, folds)) is not None:
-        holding = f"that holds in all {counted(laws.able, 'log')} that can show it"
+        holding = f"that holds in {all_counted(laws.able, 'log')} that can show it"
         shared = _lawful(common, after, measurements, holding, laws.moves)
         claims.append(Claim(shared, Figures("law")))
         after, refitted = common.fit, common.problem
