@@ -2,8 +2,8 @@
 
 The log is cut into contiguous blocks, dealt to folds in turn. For every fold the hypothesis, hull included, is fitted to the
 windows of the other folds that stay a purge gap away, and judged on the windows of its own: so every window is judged once, by
-a fit that has not seen it. The hull may move there within what the others leave open of it, with what is judged and without
-(`ferryid.diagnose.inference.hull_uncertainty`). Which effects were chosen, and when they begin, is known from the whole log.
+a fit that has not seen it, as surely as the other folds know the hull (`ferryid.diagnose.inference.hull_uncertainty`). Which
+effects were chosen, and when they begin, is known from the whole log.
 
 Errors are judged in the weak form: ``M (a_picture - a_measured)`` averaged over a window, with the velocities' first derivative
 moved onto the window's weight and the mass matrix of the plain force model, before and after alike. That is a force along the
@@ -56,9 +56,9 @@ class HeldOut:
     gaps
         On the channels that are fitted, shape (J, channels).
     errors
-        As forces along the vessel's axes [N, N, N·m], of the fold's fit with the hull moved, shape (J, 3).
+        As forces along the vessel's axes [N, N, N·m], shape (J, 3).
     fits
-        One for every fold, with the hull moved.
+        One for every fold.
     """
 
     gaps: Floats
@@ -81,6 +81,8 @@ class Improvement:
     score, score_low
         Gain in log-likelihood of all channels under the noise of the better fit, with the same interval; positive where the
         second hypothesis predicts better.
+    fits_before, fits_after
+        One for every fold, which leave these errors.
     """
 
     before: Floats
@@ -92,6 +94,8 @@ class Improvement:
     high: Floats
     score: float
     score_low: float
+    fits_before: tuple[Fit, ...]
+    fits_after: tuple[Fit, ...]
 
 
 @dataclass(frozen=True)
@@ -151,12 +155,13 @@ def held_out_evidence(problem: EstimationProblem, found: Fit) -> HeldOutEvidence
         return None
     base = held_out(problem, folds, ())
     full = held_out(problem, folds, found.candidates, found.values, found)
+    whole = compare_held_out(problem, folds, base, full)
     proofs = tuple(over(lambda index: _proof(problem, folds, found, full, base, index), range(len(found.candidates))))
     return HeldOutEvidence(
         folds,
-        compare_held_out(problem, folds, base, full),
+        whole,
         proofs,
-        free_runs(problem, folds, base.fits, full.fits),
+        free_runs(problem, folds, whole.fits_before, whole.fits_after),
     )
 
 
@@ -196,36 +201,67 @@ def held_out(
     for k, made in enumerate(fits):
         own = folds.fold == k
         gaps[own] = subset(problem.windows, own).gap(fitted_force_model(problem.plain, made))
-    white = problem.noise.white(gaps, problem.windows.runs)
-    moves = [known.move(white) for known in hull_uncertainty(problem, folds)]
-    fits = [replace(made, hull=made.hull + problem.hull_spread * move) for made, move in zip(fits, moves, strict=True)]
+    return HeldOut(gaps, _errors(problem, folds, fits), tuple(fits))
+
+
+def _errors(problem: EstimationProblem, folds: Folds, fits: Sequence[Fit]) -> Floats:
     errors = np.empty((len(problem.windows.starts), 3))
     for k, made in enumerate(fits):
         own = folds.fold == k
         force_model = fitted_force_model(problem.plain, made)
         errors[own] = force_errors(subset(problem.windows, own), force_model, problem.plain)
-    return HeldOut(gaps, errors, tuple(fits))
+    return errors
+
+
+def _with_hull_moved(problem: EstimationProblem, folds: Folds, one: HeldOut) -> HeldOut:
+    """Return what a hypothesis leaves if the hull is moved in every fold to what its windows show of what is open."""
+    white = problem.noise.white(one.gaps, problem.windows.runs)
+    moves = [known.move(white) for known in hull_uncertainty(problem, folds)]
+    fits = tuple(
+        replace(made, hull=made.hull + problem.hull_spread * move) for made, move in zip(one.fits, moves, strict=True)
+    )
+    return HeldOut(one.gaps, _errors(problem, folds, fits), fits)
 
 
 def compare_held_out(problem: EstimationProblem, folds: Folds, before: HeldOut, after: HeldOut) -> Improvement:
-    """Return how much better the second of two hypotheses predicts."""
+    """Return how much better the second of two hypotheses predicts.
+
+    Where the errors of an axis grow, but not with the hull moved within what is open of it, the hull is what was wrong there,
+    and the errors with it moved count for both.
+    """
     picks = draws(folds.block)
+    gains = _gains(problem, folds, before.gaps, after.gaps)
+    score, score_low = float(gains.sum()), float(np.quantile(picks @ gains, 0.025))
+    plain = _improvement(folds, picks, before, after, score, score_low)
+    if not _grows(plain):
+        return plain
+    moved = [_with_hull_moved(problem, folds, one) for one in (before, after)]
+    within = _improvement(folds, picks, moved[0], moved[1], score, score_low)
+    return plain if _grows(within) else within
+
+
+def _grows(made: Improvement) -> bool:
+    return bool(np.min(made.removed) < -JUDGING.worsening)
+
+
+def _improvement(
+    folds: Folds, picks: Floats, before: HeldOut, after: HeldOut, score: float, score_low: float
+) -> Improvement:
     sums = [by_block(one.errors**2, folds.block) for one in (before, after)]
-    removed = 1.0 - sums[1].sum(axis=0) / sums[0].sum(axis=0)
     drawn = 1.0 - (picks @ sums[1]) / (picks @ sums[0])
     low, high = np.quantile(drawn, [0.025, 0.975], axis=0)
-    gains = _gains(problem, folds, before.gaps, after.gaps)
-    score_low = np.quantile(picks @ gains, 0.025)
     return Improvement(
         before.errors,
         after.errors,
         np.mean(before.errors**2, axis=0),
         np.mean(after.errors**2, axis=0),
-        removed,
+        1.0 - sums[1].sum(axis=0) / sums[0].sum(axis=0),
         low,
         high,
-        float(gains.sum()),
-        float(score_low),
+        score,
+        score_low,
+        before.fits,
+        after.fits,
     )
 
 
@@ -346,8 +382,8 @@ def _proof(problem: EstimationProblem, folds: Folds, found: Fit, full: HeldOut, 
         theirs = {name: float(one.sum()) for name, one in by_stiff.items()}
         held = over_stiff.score_low > 0.0 and beyond > 0.0 and not _matched(over_stiff.score, theirs, alike)
         if held or not holds:
-            without, full, made, scores, beaten, holds = stiff, judged, over_stiff, theirs, beyond, held
-    return Proof(candidate, made, scores, beaten, holds, free_runs(problem, folds, without.fits, full.fits))
+            made, scores, beaten, holds = over_stiff, theirs, beyond, held
+    return Proof(candidate, made, scores, beaten, holds, free_runs(problem, folds, made.fits_before, made.fits_after))
 
 
 def _matched(score: float, placebos: Mapping[str, float], alike: float) -> bool:
