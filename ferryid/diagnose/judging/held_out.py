@@ -376,7 +376,7 @@ def _proof(problem: EstimationProblem, folds: Folds, found: Fit, full: HeldOut, 
         own = held_out(rigid, folds, found.candidates, found.values)
         # What held beside a refitted hull has to do so on that of the model, without what the refit adds.
         judged = own if holds else full
-        over_stiff = compare_held_out(problem, folds, stiff, judged)
+        over_stiff = compare_held_out(rigid, folds, stiff, judged)
         gains, by_stiff = _gains(problem, folds, stiff.gaps, own.gaps), gains_of_placebos(rigid, stiff)
         beyond = _beaten(picks, gains, by_stiff)
         theirs = {name: float(one.sum()) for name, one in by_stiff.items()}
