@@ -377,7 +377,7 @@ def _proof(problem: EstimationProblem, folds: Folds, found: Fit, full: HeldOut, 
         # What held beside a refitted hull has to do so on that of the model, without what the refit adds.
         judged = own if holds else full
         over_stiff = compare_held_out(rigid, folds, stiff, judged)
-        gains, by_stiff = _gains(problem, folds, stiff.gaps, own.gaps), gains_of_placebos(rigid, stiff)
+        gains, by_stiff = _gains(rigid, folds, stiff.gaps, own.gaps), gains_of_placebos(rigid, stiff)
         beyond = _beaten(picks, gains, by_stiff)
         theirs = {name: float(one.sum()) for name, one in by_stiff.items()}
         held = over_stiff.score_low > 0.0 and beyond > 0.0 and not _matched(over_stiff.score, theirs, alike)
