@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ferryid.counts import counted
+from ferryid.counts import all_counted, counted
 from ferryid.identify.sweeps import BY, Structure, StructureComparison, StructureSweep, over_base
 from ferryid.types import AXES
 
@@ -24,7 +24,7 @@ def _supported(one: StructureComparison, the: str) -> str:
             f"{counted(count, 'structure')}."
         )
     which = (
-        f"all {counted(count, 'structure')}, as none is significantly worse than the best at 95 %"
+        f"{all_counted(count, 'structure')}, as none is significantly worse than the best at 95 %"
         if len(kept) == count
         else f"the {len(kept)} of {counted(count, 'structure')} that are not significantly worse than the best at 95 %"
     )

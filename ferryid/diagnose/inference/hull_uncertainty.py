@@ -70,7 +70,8 @@ def hull_uncertainty(problem: EstimationProblem, folds: Folds) -> tuple[HullUnce
     made = []
     for k, training in enumerate(folds.training):
         rows = np.repeat(folds.fold[whitened] == k, channels)
-        by_others = problem.part(training).by_hull
-        precision = (by_others.T @ by_others + np.eye(slopes.shape[1])) / INFERENCE.posterior_factor**2
-        made.append(HullUncertainty(rows, slopes[rows], precision))
+        free, _, information = problem.part(training).origin.by_free_hull
+        precision = np.eye(slopes.shape[1])
+        precision[np.ix_(free, free)] += information
+        made.append(HullUncertainty(rows, slopes[rows], precision / INFERENCE.posterior_factor**2))
     return tuple(made)

@@ -240,6 +240,12 @@ def test_what_a_hull_imitates_by_straining_is_weighed_against_the_hull_of_the_mo
     (proof,) = evidence.proofs
     assert proof.holds
     assert proof.improvement.removed.min() > 0.9
+    rigid = replace(problem, hull_spread=np.zeros_like(problem.hull_spread))
+    own = held_out(rigid, folds, found.candidates, found.values)
+    assert proof.improvement.score == pytest.approx(
+        compare_held_out(rigid, folds, held_out(rigid, folds, ()), own).score
+    )
+    assert proof.beaten > 0.5 * proof.improvement.score
 
 
 def test_a_placebo_keeps_what_is_fitted_beside_an_effect_and_never_told(windy: EstimationProblem) -> None:
