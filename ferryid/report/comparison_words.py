@@ -340,6 +340,8 @@ def coefficient_table(result: ComparisonResult) -> list[Values]:
 
 HELD = "held"
 """In the place of the interval of a coefficient that a fit did not estimate."""
+ROUNDING = 1e-9
+"""A coefficient without an interval that is less, in SI units, is what is left of a difference."""
 
 
 def estimated(result: ComparisonResult) -> frozenset[str]:
@@ -358,7 +360,7 @@ def cell(one: Coefficient | None, *, of_fit: bool = False) -> tuple[str, str]:
 
     `of_fit` is whether the others of its model have intervals: then one without any was held.
     """
-    if one is None or (one.value == 0.0 and not any(isfinite(end) and end != 0.0 for end in (one.low, one.high))):
+    if one is None or (abs(one.value) < ROUNDING and not _has_interval(one)):
         return "–", ""
     if not _has_interval(one):
         return number(one.value, ".4g"), HELD if of_fit else ""

@@ -270,4 +270,7 @@ def test_what_a_fit_did_not_estimate_is_held_and_has_no_interval() -> None:
     assert text.count("(held)") == 1
     assert comparison_words.cell(held["one"], of_fit=True) == ("15", "held")
     assert comparison_words.cell(held["none"]) == ("15", "")
+    # What is left of the difference of two terms is no coefficient.
+    assert comparison_words.cell(Coefficient(-1.4e-12, nan, nan)) == ("–", "")
+    assert comparison_words.cell(Coefficient(0.0, -1.0, 1.0)) == ("0", "-1 to 1")
     assert "held" not in "\n".join(_coefficient_table(replace(found, coefficients=Coefficients(rows[:1], ()))))
