@@ -105,7 +105,9 @@ _OF_A_SPEED = frozenset({"water", "field"})
 """Words of what is no pose or velocity that the name of a speed has all the same: through the water, the field of a message."""
 _ASIDE = frozenset({"y", "z"})
 _OTHER_SPEEDS = frozenset({"wind", "air", "vertical", "down", "heave", "sway", "turn"})
-_QUATERNION = frozenset({"orientation", "rotation", "quaternion", "heading", "attitude"})
+_QUATERNION = frozenset({"orientation", "rotation", "quaternion", "quat", "q", "heading", "attitude"})
+_PARTS_OF_QUATERNION = {f"q{one}": ("q", one) for one in "xyzw"}
+"""Words that name a part of a quaternion, as two."""
 _ANGLES = frozenset({"orientation", "attitude", "euler", "rpy"})
 """What three numbers are roll, pitch and heading of."""
 _PRESENT = frozenset({*_ANGLES, "rotational", "angular", "yaw", "psi", "pose", "position", "lat", "lon"})
@@ -261,7 +263,7 @@ def _present(words: tuple[str, ...]) -> tuple[str, ...]:
 def _of_topic(topic: Topic, around: set[str], fields: Mapping[str, tuple[str, ...]]) -> list[FieldGroup]:
     groups: dict[tuple[str, ...], dict[str, str]] = {}
     for path, words in fields.items():
-        axis, stem = _axis(words)
+        axis, stem = _axis((*words[:-1], *_PARTS_OF_QUATERNION.get(words[-1], words[-1:])) if words else words)
         groups.setdefault(stem, {}).setdefault(axis, path)
     # Columns of a table share no stem: what names the axes of one vector lies in several.
     table = topic.encoding == "table"

@@ -256,9 +256,14 @@ def _agreement(pose: _Pose, velocity: FieldGroup | None, samples: Samples) -> _A
 
 @dataclass(frozen=True)
 class _Course:
-    """How the course goes with the heading: the mean of their difference as a point of the unit circle."""
+    """How the course goes with the heading: the mean of their difference as a point of the unit circle, and of its double.
+
+    A vessel that goes astern as much as ahead has courses on either side, of which the double is the same (Mardia and Jupp
+    2000, section 1.1: axial data).
+    """
 
     mean: complex = 0j
+    doubled: complex = 0j
 
     @property
     def along(self) -> float:
@@ -272,8 +277,18 @@ class _Course:
 
     @property
     def steady(self) -> float:
-        """How well heading and course agree: as `along`, or a little less where its zero would have to be another."""
-        return max(self.along, abs(self.mean) - DRAFT.other_zero)
+        """How well heading and course agree: as `along`, or a little less where its zero would have to be another.
+
+        Less still where the vessel would have to go astern as well as ahead.
+        """
+        return max(self.along, abs(self.mean) - DRAFT.other_zero, abs(self.doubled) - 2.0 * DRAFT.other_zero)
+
+    @property
+    def either_way_deg(self) -> float | None:
+        """By how much the line of courses ahead and astern is off the heading, clockwise [deg]; None where there is no such."""
+        if abs(self.doubled) < DRAFT.either_way or self.off_deg:
+            return None
+        return 0.5 * float(np.degrees(np.angle(self.doubled)))
 
 
 def _course(pose: _Pose) -> _Course:
@@ -286,8 +301,8 @@ def _course(pose: _Pose) -> _Course:
     rows &= speed > DRAFT.moving * float(np.quantile(speed[rows], 0.95)) if rows.any() else rows
     if np.count_nonzero(rows) < DRAFT.fewest_rows:
         return _Course()
-    course = np.arctan2(pose.east[rows], pose.north[rows])
-    return _Course(complex(np.mean(np.exp(1j * (course - pose.psi[rows])))))
+    apart = np.exp(1j * (np.arctan2(pose.east[rows], pose.north[rows]) - pose.psi[rows]))
+    return _Course(complex(np.mean(apart)), complex(np.mean(apart**2)))
 
 
 def _turned_with_course(rates: Sequence[FieldGroup], pose: _Pose, slope: Floats, samples: Samples) -> str:
@@ -373,13 +388,23 @@ def _heading(
     elif along >= DRAFT.agrees:
         evidence = f"the vessel moves along it (mean cosine {along:.2f}); {evidence}"
     elif course.off_deg:
-        offset = -course.off_deg if pose.heading_frame == "ENU" else course.off_deg
-        key = "offset_deg" if pose.heading_unit == "quaternion" else "offset"
-        value = np.radians(offset) if pose.heading_unit == "rad" else offset
         doubts.append(
             f"course and heading are {abs(course.off_deg):.0f} deg apart at all headings (mean resultant length "
-            f"{abs(course.mean):.2f}): if the vessel moved ahead, add {key} = {value:.3g}"
+            f"{abs(course.mean):.2f}): if the vessel moved ahead, add {_offset(pose, course.off_deg)}"
         )
+    elif (off := course.either_way_deg) is not None:
+        doubled = f"mean resultant length of the doubled angle {abs(course.doubled):.2f}"
+        if abs(off) <= DRAFT.along_hull_deg:
+            evidence = f"the vessel moves along it, ahead and astern ({doubled}); {evidence}"
+            doubts.append(
+                "ahead or astern is not for the course to say: add 180 deg if it goes astern where its actuators push ahead"
+            )
+        else:
+            back = off - 180.0 if off > 0.0 else off + 180.0
+            doubts.append(
+                f"ahead and astern, courses lie {abs(off):.0f} deg off the heading ({doubled}): add {_offset(pose, off)}, or "
+                f"{_offset(pose, back)}, so that the vessel goes ahead where its actuators push ahead"
+            )
     else:
         why = "no course to compare" if pose.position is None else f"mean cosine of course and heading {along:.2f}"
         doubts.append(
@@ -390,6 +415,13 @@ def _heading(
         "heading", pose.heading.topic, pose.heading.fields, pose.heading_unit, pose.heading_frame, 1.0, (evidence,),
         tuple(doubts),
     )  # fmt: skip
+
+
+def _offset(pose: _Pose, off_deg: float) -> str:
+    """Return the line of a profile that turns a heading by an angle clockwise [deg]."""
+    offset = -off_deg if pose.heading_frame == "ENU" else off_deg
+    key = "offset_deg" if pose.heading_unit == "quaternion" else "offset"
+    return f"{key} = {np.radians(offset) if pose.heading_unit == 'rad' else offset:.3g}"
 
 
 def _hull_velocity(chosen: _Agreement, groups: Sequence[FieldGroup], samples: Samples) -> tuple[float, str] | None:

@@ -87,6 +87,18 @@ class DraftThresholds:
         "by which a heading with another zero has to agree better with the course than one as it is",
         "convention: on a straight run any heading agrees with some zero",
     )
+    either_way: float = threshold(
+        0.5,
+        "mean resultant length",
+        "of twice the course less heading from which the vessel goes ahead and astern on one line of its hull",
+        "convention: a circular standard deviation of 34 degrees, of drift angles while it backs",
+    )
+    along_hull_deg: float = threshold(
+        10.0,
+        "deg",
+        "a line of courses ahead and astern that is no farther off the heading is along the hull",
+        "convention: drift angles, and a deviation of the compass",
+    )
     gain: float = threshold(
         0.15,
         "of the logarithm",

@@ -98,7 +98,7 @@ def free_run_caution(diagnosis: Diagnosis) -> str:
     worse = [
         f"{row['quantity']} ({row['ratio']:.2f} times)"
         for row in free_run_rows(diagnosis)
-        if row["ratio"] > WORSE_RUN and not row["low"] <= 1.0
+        if row["ratio"] > WORSE_RUN and row["low"] > 1.0
     ]
     if not worse:
         return ""

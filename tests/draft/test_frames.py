@@ -73,6 +73,33 @@ def test_the_course_shows_how_a_heading_counts_and_where_its_zero_is(
     assert any("does not move along its heading as it is read" in one for one in found["position"].evidence)
 
 
+@pytest.mark.parametrize("mirrored", [True, False])
+@pytest.mark.parametrize("zero_deg", [0.0, 90.0])
+def test_a_vessel_that_goes_astern_as_much_as_ahead_shows_how_its_heading_counts(
+    tmp_path: Path, zero_deg: float, mirrored: bool
+) -> None:
+    t = np.arange(0.0, 300.0, 0.2)
+    psi, u = 0.15 * t + 0.5 * np.sin(t / 9.0), np.sign(np.sin(t / 7.0))
+    north, east = (np.cumsum(u * one) * 0.2 for one in (np.cos(psi), np.sin(psi)))
+    latitude, longitude = 63.4 + north / 111_400.0, 10.4 + east / (111_400.0 * np.cos(np.radians(63.4)))
+    yaw = 0.5 * (0.5 * np.pi - psi if mirrored else psi) + 0.5 * np.radians(zero_deg)
+    # A quaternion, by the short names of its parts.
+    columns = (t, latitude, longitude, 0.0 * t, 0.0 * t, np.sin(yaw), np.cos(yaw), 100.0 * u)
+    path = tmp_path / "log.csv"
+    header = "t,latitude,longitude,qx,qy,qz,qw,rpm"
+    np.savetxt(path, np.column_stack(columns), "%.9g", ",", header=header, comments="")
+    heading = {signal.quantity: signal for signal in draft_profile(path).every}["heading"]
+    assert heading.fields == ("qx", "qy", "qz", "qw")
+    assert heading.frame == ("ENU" if mirrored else "NED")
+    if zero_deg == 0.0:
+        assert any("moves along it, ahead and astern" in one for one in heading.evidence)
+        return
+    (doubt,) = (one for one in heading.doubts if "offset_deg" in one)
+    added = [float(one.split(",")[0].split()[0]) for one in doubt.split("offset_deg = ")[1:]]
+    assert sorted(abs(one) for one in added) == pytest.approx([90.0, 90.0], abs=5.0)
+    assert sum(added) == pytest.approx(0.0, abs=5.0)
+
+
 def test_the_messages_may_say_in_which_frame_they_are() -> None:
     """Simulated logs are in NED and FRD, as their headers say."""
     found = {signal.quantity: signal for signal in draft_profile(FIXTURES / "short.mcap").every}

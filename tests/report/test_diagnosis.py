@@ -285,23 +285,26 @@ def test_a_free_run_that_turned_too_often_is_told_in_turns() -> None:
     assert position["cells"][:2] == ["40", "40"]
 
 
-def test_free_runs_that_err_more_with_the_findings_are_cautioned_of() -> None:
+def test_free_runs_that_surely_err_more_with_the_findings_are_cautioned_of() -> None:
     made = diagnosis("explained")
 
-    def after_runs(position: float, heading: float) -> Diagnosis:
+    def after_runs(heading: float, low: float) -> Diagnosis:
         runs = [
             {"horizons_s": [60.0], "position_m": [one], "heading_rad": [other]}
-            for one, other in ((40.0, 0.5), (position, heading))
+            for one, other in ((40.0, 0.5), (60.0, 0.5 * heading))
         ]
+        # Of a position that one block alone shows no interval is known: that says nothing.
+        ratios = {"horizon_s": 60.0, "heading_rad": {"value": heading, "low": low, "high": 2.0}}
         before, after = ({**part, "free_run": run} for part, run in zip((made.before, made.after), runs, strict=True))
-        return replace(made, before=before, after=after)
+        return replace(made, before=before, after={**after, "free_run_ratio": ratios})
 
-    assert free_run_caution(after_runs(20.0, 0.54)) == ""
-    said = free_run_caution(after_runs(60.0, 0.6))
-    assert said.startswith("Free runs err more with the findings, in position (1.50 times) and heading (1.20 times),")
-    assert said in " ".join(as_text([after_runs(60.0, 0.6)]).split())
+    assert free_run_caution(after_runs(1.2, 0.9)) == ""
+    assert free_run_caution(after_runs(1.05, 1.01)) == ""
+    said = free_run_caution(after_runs(1.2, 1.1))
+    assert said.startswith("Free runs err more with the findings, in heading (1.20 times),")
+    assert said in " ".join(as_text([after_runs(1.2, 1.1)]).split())
     # Without findings there is nothing to compare.
-    assert free_run_caution(replace(after_runs(60.0, 0.6), findings=())) == ""
+    assert free_run_caution(replace(after_runs(1.2, 1.1), findings=())) == ""
 
 
 def test_the_verdict_says_why_all_findings_remove_less_than_one_of_them_alone() -> None:
