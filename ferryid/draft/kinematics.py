@@ -290,6 +290,17 @@ class _Course:
             return None
         return 0.5 * float(np.degrees(np.angle(self.doubled)))
 
+    @property
+    def both_ways(self) -> bool:
+        """Whether the vessel goes along the hull, ahead and astern."""
+        off = self.either_way_deg
+        return off is not None and abs(off) <= DRAFT.along_hull_deg
+
+    @property
+    def doubled_length(self) -> str:
+        """How nearly all courses lie on one line, in words."""
+        return f"mean resultant length of the doubled angle {abs(self.doubled):.2f}"
+
 
 def _course(pose: _Pose) -> _Course:
     """Return how the course of a vessel that moves goes with its heading."""
@@ -351,9 +362,15 @@ def _position(pose: _Pose, chosen: _Agreement, named: str) -> MappedSignal:
 
 def _shown(chosen: _Agreement) -> str:
     if chosen.velocity is None:
-        along = _course(chosen.pose).along
-        how = "moves along its heading" if along >= DRAFT.agrees else "does not move along its heading as it is read"
-        return f"the vessel {how} (mean cosine {along:.2f})"
+        course = _course(chosen.pose)
+        if course.along < DRAFT.agrees and course.both_ways:
+            return f"the vessel moves along its heading, ahead and astern ({course.doubled_length})"
+        how = (
+            "moves along its heading"
+            if course.along >= DRAFT.agrees
+            else "does not move along its heading as it is read"
+        )
+        return f"the vessel {how} (mean cosine {course.along:.2f})"
     turned = ", turned by the heading," if chosen.frame in _BODY else ""
     label = chosen.velocity.label
     if chosen.share < DRAFT.agrees:
@@ -393,17 +410,17 @@ def _heading(
             f"{abs(course.mean):.2f}): if the vessel moved ahead, add {_offset(pose, course.off_deg)}"
         )
     elif (off := course.either_way_deg) is not None:
-        doubled = f"mean resultant length of the doubled angle {abs(course.doubled):.2f}"
-        if abs(off) <= DRAFT.along_hull_deg:
-            evidence = f"the vessel moves along it, ahead and astern ({doubled}); {evidence}"
+        if course.both_ways:
+            evidence = f"the vessel moves along it, ahead and astern ({course.doubled_length}); {evidence}"
             doubts.append(
-                "ahead or astern is not for the course to say: add 180 deg if it goes astern where its actuators push ahead"
+                f"ahead or astern is not for the course to say: add {_offset(pose, 180.0)} if the vessel goes astern where its "
+                "actuators push ahead"
             )
         else:
             back = off - 180.0 if off > 0.0 else off + 180.0
             doubts.append(
-                f"ahead and astern, courses lie {abs(off):.0f} deg off the heading ({doubled}): add {_offset(pose, off)}, or "
-                f"{_offset(pose, back)}, so that the vessel goes ahead where its actuators push ahead"
+                f"ahead and astern, courses lie {abs(off):.0f} deg off the heading ({course.doubled_length}): add "
+                f"{_offset(pose, off)}, or {_offset(pose, back)}, so that the vessel goes ahead where its actuators push ahead"
             )
     else:
         why = "no course to compare" if pose.position is None else f"mean cosine of course and heading {along:.2f}"

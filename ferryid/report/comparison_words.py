@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import degrees, isfinite, isnan, nan
 
+import numpy as np
+
 from ferryid.compare import (
     BASE,
     Coefficient,
@@ -20,6 +22,7 @@ from ferryid.counts import counted
 from ferryid.effects import effects
 from ferryid.effects.wording import listed, titled
 from ferryid.regression import REGRESSION
+from ferryid.report.rounding import without_rounding
 from ferryid.report.scale import scale_words
 from ferryid.types import AXES
 
@@ -329,7 +332,26 @@ Values = tuple[str, str, Mapping[str, Coefficient]]
 
 def coefficient_table(result: ComparisonResult) -> list[Values]:
     """Return the coefficients of the equations of motion, and below them the terms that are no hull's."""
-    rows: list[Values] = [(row.coefficient, row.unit, row.values) for row in result.coefficients.physical]
+    physical = result.coefficients.physical
+    labels = {label for row in physical for label in row.values}
+    shown = {
+        label: without_rounding(
+            {
+                row.coefficient: np.array([one.value, one.low, one.high])
+                for row in physical
+                if (one := row.values.get(label)) is not None
+            }
+        )
+        for label in labels
+    }
+    rows: list[Values] = [
+        (
+            row.coefficient,
+            row.unit,
+            {label: Coefficient(*shown[label][row.coefficient].tolist()) for label in row.values},
+        )
+        for row in physical
+    ]
     rows += [
         (f"{_constant(row.term)} in {row.axis}", row.unit, row.values)
         for row in result.coefficients.terms
@@ -340,8 +362,6 @@ def coefficient_table(result: ComparisonResult) -> list[Values]:
 
 HELD = "held"
 """In the place of the interval of a coefficient that a fit did not estimate."""
-ROUNDING = 1e-9
-"""A coefficient without an interval that is less, in SI units, is what is left of a difference."""
 
 
 def estimated(result: ComparisonResult) -> frozenset[str]:
@@ -360,7 +380,7 @@ def cell(one: Coefficient | None, *, of_fit: bool = False) -> tuple[str, str]:
 
     `of_fit` is whether the others of its model have intervals: then one without any was held.
     """
-    if one is None or (abs(one.value) < ROUNDING and not _has_interval(one)):
+    if one is None or (one.value == 0.0 and not _has_interval(one)):
         return "–", ""
     if not _has_interval(one):
         return number(one.value, ".4g"), HELD if of_fit else ""

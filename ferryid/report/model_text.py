@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from shlex import quote
@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from ferryid.counts import counted
-from ferryid.effects.force_model import MASS
 from ferryid.models import Model, fitted_conditions, model_to_json
 from ferryid.models.coefficients import EQUATION_UNITS, equation_coefficients
 from ferryid.models.store import Change
-from ferryid.types import AXES, Floats
+from ferryid.report.rounding import without_rounding
+from ferryid.types import AXES
 
 MOST_CHANGES = 10
 """Changes of the current version that the list shows, the latest ones."""
@@ -99,7 +99,7 @@ def render_model(model: Model) -> str:
         ]
     if model.hull and corrected:
         lines += ["", f"{'hull':<14}{'value':>20}{'low':>13}{'high':>13}  unit"]
-        shown = _without_rounding({name: np.array([one.value, one.low, one.high]) for name, one in model.hull.items()})
+        shown = without_rounding({name: np.array([one.value, one.low, one.high]) for name, one in model.hull.items()})
         for name, one in model.hull.items():
             value, low, high = shown[name].tolist()
             lines.append(f"{name:<14}{value:>20.5g}{low:>13.5g}{high:>13.5g}  {one.unit}")
@@ -113,20 +113,10 @@ def render_model(model: Model) -> str:
     return "\n".join(lines)
 
 
-def _without_rounding(values: Mapping[str, Floats]) -> dict[str, Floats]:
-    """Return coefficients to be shown, with zero for what is nothing but rounding: beside the mass matrix, or all the rest."""
-    shown: dict[str, Floats] = {}
-    for part in (set(MASS), set(values) - set(MASS)):
-        sizes = np.array([abs(float(values[name][0])) for name in values if name in part])
-        least = np.finfo(np.float64).eps * np.max(sizes, initial=0.0, where=np.isfinite(sizes))
-        shown |= {name: np.where(np.abs(one) <= least, 0.0, one) for name, one in values.items() if name in part}
-    return shown
-
-
 def _equations(model: Model) -> list[str]:
     """Return the coefficients of the equations of motion as a table: in the model, in the base model, and the change."""
-    found = _without_rounding(equation_coefficients(model))
-    before = _without_rounding(equation_coefficients(replace(model, hull={}, theta=np.zeros_like(model.theta))))
+    found = without_rounding(equation_coefficients(model))
+    before = without_rounding(equation_coefficients(replace(model, hull={}, theta=np.zeros_like(model.theta))))
     lines = [
         "",
         "equations of motion, base model and correction together (95 % intervals)",

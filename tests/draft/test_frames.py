@@ -88,11 +88,14 @@ def test_a_vessel_that_goes_astern_as_much_as_ahead_shows_how_its_heading_counts
     path = tmp_path / "log.csv"
     header = "t,latitude,longitude,qx,qy,qz,qw,rpm"
     np.savetxt(path, np.column_stack(columns), "%.9g", ",", header=header, comments="")
-    heading = {signal.quantity: signal for signal in draft_profile(path).every}["heading"]
+    found = {signal.quantity: signal for signal in draft_profile(path).every}
+    heading, position = found["heading"], found["position"]
     assert heading.fields == ("qx", "qy", "qz", "qw")
     assert heading.frame == ("ENU" if mirrored else "NED")
     if zero_deg == 0.0:
         assert any("moves along it, ahead and astern" in one for one in heading.evidence)
+        assert any("moves along its heading, ahead and astern" in one for one in position.evidence)
+        assert any(f"add offset_deg = {'-' if mirrored else ''}180 if" in one for one in heading.doubts)
         return
     (doubt,) = (one for one in heading.doubts if "offset_deg" in one)
     added = [float(one.split(",")[0].split()[0]) for one in doubt.split("offset_deg = ")[1:]]

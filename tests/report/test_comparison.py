@@ -257,6 +257,18 @@ def test_nor_is_it_where_it_may_be_better() -> None:
     assert row.sentence.endswith("; no evidence, as one was fitted to this log")
 
 
+def test_what_is_nothing_but_rounding_beside_the_masses_is_no_coefficient() -> None:
+    rows = [
+        CoefficientRow(name, "kg", {"one": Coefficient(value, nan, nan)})
+        for name, value in (("m22", 4000.0), ("m32", -1.4e-12), ("X_u", 1e-3))
+    ]
+    found = replace(result(("one", "none"), 0.5), coefficients=Coefficients(tuple(rows), ()))
+    table = {
+        name: comparison_words.cell(values["one"]) for name, _, values in comparison_words.coefficient_table(found)
+    }
+    assert table == {"m22": ("4000", ""), "m32": ("–", ""), "X_u": ("0.001", "")}
+
+
 def test_what_a_fit_did_not_estimate_is_held_and_has_no_interval() -> None:
     here = {"one": Coefficient(30.0, 20.0, 40.0), "none": Coefficient(28.0, nan, nan)}
     held = {"one": Coefficient(15.0, nan, nan), "none": Coefficient(15.0, nan, nan)}
@@ -270,7 +282,5 @@ def test_what_a_fit_did_not_estimate_is_held_and_has_no_interval() -> None:
     assert text.count("(held)") == 1
     assert comparison_words.cell(held["one"], of_fit=True) == ("15", "held")
     assert comparison_words.cell(held["none"]) == ("15", "")
-    # What is left of the difference of two terms is no coefficient.
-    assert comparison_words.cell(Coefficient(-1.4e-12, nan, nan)) == ("–", "")
     assert comparison_words.cell(Coefficient(0.0, -1.0, 1.0)) == ("0", "-1 to 1")
     assert "held" not in "\n".join(_coefficient_table(replace(found, coefficients=Coefficients(rows[:1], ()))))
