@@ -108,7 +108,7 @@ def parameter_errors(by_effect: Mapping[str, Sequence[float]], small: float) -> 
         axes.set_xscale("log")
         axes.set_yticks(range(len(by_effect)), list(by_effect))
         axes.invert_yaxis()
-        axes.set_xlabel("relative error of parameters (bar: median; line: target)")
+        axes.set_xlabel(f"relative error of parameters (bar: median; line: {100.0 * small:.0f} %)")
         return _svg(figure)
 
 
