@@ -18,6 +18,8 @@ FREE_RUN = (
 )
 WORSE_RUN = 1.1
 """Ratio of free-run errors from which a caution is given: less may be chance."""
+DIVERGED_MPS = 50.0
+"""Speed error of free runs above which they diverged [m/s]: how far is the integrator's, and no measure of a model."""
 
 
 def fitted(diagnosis: Diagnosis) -> bool:
@@ -69,6 +71,7 @@ def free_run_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     before, after = diagnosis.before.get("free_run", {}), diagnosis.after.get("free_run", {})
     horizons = list(before.get("horizons_s", ()))
     ratios = diagnosis.after.get("free_run_ratio", {})
+    diverged = [_diverged(run) for run in (before, after)]
     rows = []
     for key, name, unit, factor in FREE_RUN:
         runs = [run[key] for run in (before, after) if run.get(key)]
@@ -79,13 +82,19 @@ def free_run_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
         k = horizons.index(ratios["horizon_s"]) if given else known[-1]
         one, other = (_number(run[key][k]) * factor if run.get(key) else float("nan") for run in (before, after))
         ratio = _estimated(given) if given else _bare(other / one if one > 0.0 else float("nan"))
+        if any(diverged):
+            ratio = _bare(float("nan"))
+        cells = [
+            "diverges" if away else _turned(key, each / factor, _cell(each))
+            for each, away in zip((one, other), diverged, strict=True)
+        ]
         rows.append(
             {
                 "name": f"{name} after {horizons[k]:.3g} s [{unit}]",
                 "quantity": name,
                 "ratio": ratio.value,
                 "low": ratio.low,
-                "cells": [*(_turned(key, each / factor, _cell(each)) for each in (one, other)), _ratio(ratio)],
+                "cells": [*cells, _ratio(ratio)],
             }
         )
     return rows
@@ -95,6 +104,12 @@ def free_run_caution(diagnosis: Diagnosis) -> str:
     """Return in what free runs err more with the findings than without, as a sentence; empty where in nothing."""
     if not fitted(diagnosis):
         return ""
+    before, after = (_diverged(part.get("free_run", {})) for part in (diagnosis.before, diagnosis.after))
+    if after:
+        without = ", as they do without" if before else ""
+        return (
+            f"Free runs diverge with the findings{without}, whatever the force errors say: do not simulate with them."
+        )
     worse = [
         f"{row['quantity']} ({row['ratio']:.2f} times)"
         for row in free_run_rows(diagnosis)
@@ -106,6 +121,11 @@ def free_run_caution(diagnosis: Diagnosis) -> str:
         f"Free runs err more with the findings, in {listed(worse)}, whatever the force errors say: do not simulate with them "
         "unchecked."
     )
+
+
+def _diverged(run: Mapping[str, Any]) -> bool:
+    """Return whether free runs diverged at some horizon."""
+    return any(_number(one) > DIVERGED_MPS for one in run.get("speed_mps", ()))
 
 
 def _estimated(given: Mapping[str, Any]) -> Estimate:

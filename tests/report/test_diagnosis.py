@@ -307,6 +307,28 @@ def test_free_runs_that_surely_err_more_with_the_findings_are_cautioned_of() -> 
     assert free_run_caution(replace(after_runs(1.2, 1.1), findings=())) == ""
 
 
+def test_of_free_runs_that_diverge_no_number_is_shown() -> None:
+    made = diagnosis("explained")
+
+    def with_speeds(before: float, after: float) -> Diagnosis:
+        runs = [{"horizons_s": [60.0], "position_m": [40.0], "speed_mps": [one]} for one in (before, after)]
+        return replace(
+            made,
+            before={**made.before, "free_run": runs[0]},
+            after={**made.after, "free_run": runs[1], "free_run_ratio": {}},
+        )
+
+    assert [row["cells"] for row in free_run_rows(with_speeds(1.0, 2.0))] == [["40", "40", "1.00"], ["1", "2", "2.00"]]
+    assert [row["cells"] for row in free_run_rows(with_speeds(131252.0, 2.0))] == [
+        ["diverges", "40", "–"],
+        ["diverges", "2", "–"],
+    ]
+    # Without the findings they diverge, with them they do not: that is no caution.
+    assert free_run_caution(with_speeds(131252.0, 2.0)) == ""
+    assert free_run_caution(with_speeds(1.0, 131252.0)).startswith("Free runs diverge with the findings, whatever")
+    assert free_run_caution(with_speeds(1e5, 1e4)).startswith("Free runs diverge with the findings, as they do without")
+
+
 def test_the_verdict_says_why_all_findings_remove_less_than_one_of_them_alone() -> None:
     """A hull that is refitted without the findings makes up for some of them."""
     made = diagnosis("explained")
