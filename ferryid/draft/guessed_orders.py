@@ -15,6 +15,10 @@ OF_WHAT = "its name does not state of what it is an order: a share of full power
 """Doubt of what is an order by its name."""
 WHETHER = "its name states neither that it is an order nor of what: an order as a share of full power is assumed"
 """Doubt of what is named after a thruster alone."""
+OF_POWER = "its name states a power: an order as a share of full power is assumed; an electric power is no order"
+"""Doubt of a column such as ``propeller_power``."""
+_ELECTRIC = frozenset({"voltage", "volt", "volts", "current", "battery", "amps", "ampere", "watt", "watts"})
+"""Words of a column beside which a power is an electric one."""
 _THRUSTERS = {
     **{one: one for one in BASES if one not in ("rudder", "azimuth", "azi")},
     "prop": "propeller",
@@ -65,7 +69,7 @@ def guessed_orders(topics: Sequence[Topic], named: Sequence[ActuatorField]) -> l
         return sure
     every = frozenset().union(*(one.said for one in found))
     sides = [one.field for one in found if any(one.said & both and both <= every for both in _BOTH_SIDES)]
-    return sides or _numbered(topics) or _throttle(topics)
+    return sides or _numbered(topics) or _throttle(topics) or _powers(topics, paired)
 
 
 def _guess(topic: Topic, path: str, own: tuple[str, ...], paired: frozenset[tuple[str, ...]]) -> _Guess | None:
@@ -130,3 +134,24 @@ def _throttle(topics: Sequence[Topic]) -> list[ActuatorField]:
         if words[:1] == ("throttle",) and set(words[1:]) <= _VALUES | _UNITS_OF_SHARES
     ]  # fmt: skip
     return found if len(found) == 1 else []
+
+
+def _powers(topics: Sequence[Topic], paired: frozenset[tuple[str, ...]]) -> list[ActuatorField]:
+    """Return columns named after the power of a thruster: of the only one, or of several by their sides or numbers."""
+    columns = [(topic, path, sided(words, paired)) for topic in topics if topic.name == "table"
+               for path, words in numeric_fields(topic).items()]  # fmt: skip
+    if any(_ELECTRIC & set(words) for _, _, words in columns):
+        return []
+    powers = [
+        (topic, path, tuple(word for word in words if word != "power" and word not in _VALUES | _UNITS_OF_SHARES))
+        for topic, path, words in columns
+        if "power" in words and "[" not in path
+    ]
+    found = [
+        _field(topic, path, _THRUSTERS[words[0]] if len(powers) == 1 else "_".join(words), OF_POWER)
+        for topic, path, words in powers
+        if any(word in _THRUSTERS for word in words)
+        and all(word in _THRUSTERS or word in SIDES or word.isdigit() for word in words)
+        and (len(powers) == 1) == (len(words) == 1)
+    ]
+    return found if len(found) == len(powers) else []

@@ -99,6 +99,32 @@ def test_a_throttle_beside_a_propeller_with_a_name_is_left(tmp_path: Path) -> No
     assert {name for name in drafted(tmp_path, columns) if "." in name} == {"propeller.speed", "propeller.rudder"}
 
 
+@pytest.mark.parametrize("beside", ["", "battery_voltage"])
+def test_the_power_of_a_propeller_is_its_order_where_nothing_electric_is_recorded(tmp_path: Path, beside: str) -> None:
+    c = sailed()
+    columns = {"time": c["t"], "lat": c["lat"], "lon": c["lon"],
+               "orientation_x": 0.01 * c["rudder"], "orientation_y": 0.01 * c["throttle"],
+               "orientation_z": np.sin(0.5 * c["psi"]), "orientation_w": np.cos(0.5 * c["psi"]),
+               "propeller_power": 60.0 * c["throttle"], "rudder_angle": np.degrees(c["rudder"])}  # fmt: skip
+    if beside:
+        columns[beside] = 24.0 - c["throttle"]
+    found = drafted(tmp_path, columns)
+    assert ("propeller.speed.command" in found) == (not beside)
+    if not beside:
+        assert found["propeller.speed.command"].unit == "%"
+        assert any("states a power" in doubt for doubt in found["propeller.speed.command"].doubts)
+
+
+def test_the_powers_of_two_motors_are_their_orders(tmp_path: Path) -> None:
+    c = sailed()
+    columns = {"time": c["t"], "lat": c["lat"], "lon": c["lon"], "yaw": np.degrees(c["psi"]) % 360.0,
+               "left_motor_power": 60.0 + 30.0 * c["rudder"], "right_motor_power": 60.0 - 30.0 * c["rudder"]}  # fmt: skip
+    assert {name for name in drafted(tmp_path, columns) if "." in name} == {
+        "left_motor.speed.command",
+        "right_motor.speed.command",
+    }
+
+
 @pytest.mark.parametrize("wrong", ["compass", "gyro"])
 def test_the_course_tells_whether_the_heading_or_the_yaw_rate_is_wrong(tmp_path: Path, wrong: str) -> None:
     c, rng = sailed(), np.random.default_rng(3)
