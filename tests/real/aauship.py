@@ -17,6 +17,7 @@ import numpy as np
 
 from ferryid.counts import counted
 from ferryid.diagnose.judging.thresholds import JUDGING
+from ferryid.signals.artificial import NO_RECORDING
 from ferryid.signals.recording import record
 from ferryid.vessel import parse_profile
 from tests.real.places import DATA
@@ -112,11 +113,23 @@ class Made:
         """Return the names of files that are no recordings that can be used, by the reason in short."""
         found: dict[str, list[str]] = {}
         for name in files:
+            if self.simulated(name):
+                found.setdefault(SIMULATED, []).append(name)
+                continue
             for note in self.notes:
                 if name in note and (why := reason(note)):
                     found.setdefault(why, []).append(name)
                     break
         return found
+
+    def simulated(self, log: str) -> bool:
+        """Return whether the tool says of a log that it diagnoses that it is no recording: of all together where none is."""
+        if all(one["log"] != log for one in self.logs):
+            return False
+        return any(
+            NO_RECORDING in note and (f"{log}.bag {NO_RECORDING}" in note or note.startswith("Each of the "))
+            for note in self.notes
+        )
 
 
 def reason(note: str) -> str:
@@ -206,7 +219,7 @@ def section() -> str:
 def aims(results: Mapping[str, Made], logs: Sequence[str]) -> list[str]:
     """Return the rows of what is aimed at: names that something defends, and the time."""
     paths = {Path(one).stem: one for one in logs}
-    named = [one for made_ in results.values() for one in made_.claimed(sure=True) if not _simulated(made_, one[1])]
+    named = [one for made_ in results.values() for one in made_.claimed(sure=True) if not made_.simulated(one[1])]
     defended = {one: witnessed(one[0], paths[one[1]]) for one in dict.fromkeys(named)}
     missing = [f"{effect} in {_short(log)}" for (effect, log), why in defended.items() if not why]
     slowest = max(one.seconds for one in results.values())
@@ -220,13 +233,8 @@ def aims(results: Mapping[str, Made], logs: Sequence[str]) -> list[str]:
     ]
 
 
-def _simulated(one: Made, log: str) -> bool:
-    """Return whether the tool says of a log that it diagnoses that it is no recording."""
-    return any(f"{log}.bag is no recording of a vessel" in note for note in one.notes)
-
-
 def _row(title: str, one: Made, logs: Sequence[str]) -> str:
-    taken = [each for each in one.logs if not _simulated(one, str(each["log"]))]
+    taken = [each for each in one.logs if not one.simulated(str(each["log"]))]
     claims = (
         ", ".join(f"{effect} ({counted(count, 'log')})" for effect, count in _counts(one, sure).items()) or "none"
         for sure in (True, False)
@@ -238,7 +246,7 @@ def _counts(one: Made, sure: bool) -> dict[str, int]:
     """Return of how many recordings each effect is said."""
     found: dict[str, set[str]] = {}
     for effect, log in one.claimed(sure):
-        if not _simulated(one, log):
+        if not one.simulated(log):
             found.setdefault(effect, set()).add(log)
     return {effect: len(of) for effect, of in found.items()}
 

@@ -48,6 +48,9 @@ def test_a_name_that_nothing_defends_is_missed(monkeypatch: pytest.MonkeyPatch) 
     # What is said of a log that the tool holds to be simulated is the simulator's.
     simulated = Made(3.0, waves.logs, ["/x/b.bag is no recording of a vessel: so."])
     assert aims({"two": simulated}, logs)[0].endswith("| nothing named | reached |")
+    together = Made(3.0, waves.logs, ["Each of the 9 logs is no recording of a vessel: so."])
+    assert aims({"two": together}, logs)[0].endswith("| nothing named | reached |")
+    assert together.refused(["a", "b"]) == {aauship.SIMULATED: ["b"]}
 
 
 def test_the_gyro_of_the_boat_does_not_turn_where_the_heading_steps(shared_data: Callable[[str], Path]) -> None:
