@@ -50,7 +50,7 @@ def test_a_name_that_nothing_defends_is_missed(monkeypatch: pytest.MonkeyPatch) 
     assert aims({"two": simulated}, logs)[0].endswith("| nothing named | reached |")
     together = Made(3.0, waves.logs, ["Each of the 9 logs is no recording of a vessel: so."])
     assert aims({"two": together}, logs)[0].endswith("| nothing named | reached |")
-    assert together.refused(["a", "b"]) == {aauship.SIMULATED: ["b"]}
+    assert together.refused(["quay", "b"]) == {aauship.SIMULATED: ["b"]}
 
 
 def test_the_gyro_of_the_boat_does_not_turn_where_the_heading_steps(shared_data: Callable[[str], Path]) -> None:
