@@ -123,8 +123,8 @@ class Made:
         return found
 
     def simulated(self, log: str) -> bool:
-        """Return whether the tool says of a log that it diagnoses that it is no recording: of all together where none is."""
-        if all(one["log"] != log for one in self.logs):
+        """Return whether the tool says of a log that it is no recording: of all that it can read together where none is."""
+        if any(f"{log}.bag" in note and reason(note) not in ("", SIMULATED) for note in self.notes):
             return False
         return any(
             NO_RECORDING in note and (f"{log}.bag {NO_RECORDING}" in note or note.startswith("Each of the "))

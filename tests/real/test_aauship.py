@@ -48,9 +48,14 @@ def test_a_name_that_nothing_defends_is_missed(monkeypatch: pytest.MonkeyPatch) 
     # What is said of a log that the tool holds to be simulated is the simulator's.
     simulated = Made(3.0, waves.logs, ["/x/b.bag is no recording of a vessel: so."])
     assert aims({"two": simulated}, logs)[0].endswith("| nothing named | reached |")
-    together = Made(3.0, waves.logs, ["Each of the 9 logs is no recording of a vessel: so."])
+    left_out = (
+        f'{PLACE}"/gps1". The log has /imu.',
+        "Left out of the campaign: /x/quay.bag: the vessel keeps its way.",
+    )
+    together = Made(3.0, waves.logs, ["Each of the 9 logs is no recording of a vessel: so.", *left_out])
     assert aims({"two": together}, logs)[0].endswith("| nothing named | reached |")
-    assert together.refused(["quay", "b"]) == {aauship.SIMULATED: ["b"]}
+    # One that is left out for what it says is one of them; one that cannot be read is not.
+    assert together.refused(["boat", "b", "quay"]) == {aauship.SIMULATED: ["b", "quay"], "no /gps1": ["boat"]}
 
 
 def test_the_gyro_of_the_boat_does_not_turn_where_the_heading_steps(shared_data: Callable[[str], Path]) -> None:
