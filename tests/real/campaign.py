@@ -26,7 +26,7 @@ from ferryid.types import AXES, IN_MEMORY, Flags, RunContext
 from ferryid.vessel import load_profile
 from ferryid.vessel.profile import Profile
 from tests.evidence import stamp
-from tests.real import aauship, causes, changes, days, esso, groups, instruments, withheld
+from tests.real import aauship, causes, changes, days, esso, groups, instruments, times, withheld
 from tests.real.places import DATA, REPORTS
 
 ENVIRONMENT = ("wind", "current", "waves", "mooring", "gusts", "shallow_water")
@@ -51,7 +51,7 @@ def write() -> None:
     """Estimate and judge every campaign and write the page."""
     began = time.monotonic()
     load = os.getloadavg()[0]
-    parts = [HEAD, command()]
+    parts = [HEAD, command(), times.section()]
     hidden = list[dict[str, Any]]()
     for kind, title in (("random", "Random runs"), ("zigzag", "Zigzags"), ("all", "All runs")):
         print(title, flush=True)
