@@ -181,8 +181,8 @@ def actuator_fields(topics: Sequence[Topic]) -> list[ActuatorField]:
 
 def paired_names(topics: Sequence[Topic]) -> frozenset[tuple[str, ...]]:
     """Return the names of topics and fields, as words, that another has but for a letter of the other side."""
-    names = {words_of(topic.name) for topic in topics} | {
-        words for topic in topics for words in numeric_fields(topic).values()
+    names = {_split(words_of(topic.name)) for topic in topics} | {
+        _split(words) for topic in topics for words in numeric_fields(topic).values()
     }
     return frozenset(
         words
@@ -195,10 +195,11 @@ def paired_names(topics: Sequence[Topic]) -> frozenset[tuple[str, ...]]:
 def sided(words: tuple[str, ...], paired: frozenset[tuple[str, ...]]) -> tuple[str, ...]:
     """Return words with their sides written out: a letter is one beside a word of an actuator, where its pair is there too.
 
-    A lone p or r is a roll rate or a yaw rate, and delta_r a rudder angle.
+    A lone p or r is a roll rate or a yaw rate, and delta_r a rudder angle; l and r of an order are its sides.
     """
     parted = _split(words)
-    letters = words in paired and bool({*parted} & (_MARKS | {"n"}))
+    marked = bool({*parted} & (_MARKS | {"n"})) or bool({*parted} & ORDERS and {*parted} & {"l", "r"})
+    letters = parted in paired and marked
     return tuple(_LETTERS[word][1] if letters and word in _LETTERS else _SHORT_SIDES.get(word, word) for word in parted)
 
 
@@ -295,11 +296,13 @@ def parted(shared: SharedTopic, samples: Samples) -> tuple[list[ActuatorField], 
 
 
 def _split(words: Sequence[str]) -> tuple[str, ...]:
-    """Part what is written as one: a side before pwm, the mark of an order before rudder."""
+    """Part what is written as one: a side before pwm or behind motor, the mark of an order before rudder."""
     parted: list[str] = []
     for word in words:
         if match := re.fullmatch(r"(l|r|left|right)(pwm|rpm|thruster|motor)", word):
             parted += [{"l": "left", "r": "right"}.get(match[1], match[1]), match[2]]
+        elif match := re.fullmatch(r"(cmd|mot|motor)(l|r)", word):
+            parted += [{"mot": "motor"}.get(match[1], match[1]), match[2]]
         elif match := re.fullmatch(r"(cmd|ref)(rudder|throttle|thrust|thruster|motor|rpm|pwm|azimuth)", word):
             parted += [match[1], match[2]]
         else:

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ferryid.draft.actuator_fields import actuator_fields, constant, parted, shared_topics
+from ferryid.draft.actuator_fields import UNRELATED, actuator_fields, constant, parted, shared_topics
 from ferryid.draft.actuators import UNKNOWN_ORDER, DraftedActuator, drafted_actuators
 from ferryid.draft.autopilots import Orders, autopilot_fields, autopilot_groups, changing, orders, with_frames
-from ferryid.draft.fields import FieldGroup, navigation_groups, speeds_ahead
+from ferryid.draft.fields import ORDERS, FieldGroup, navigation_groups, numeric_fields, speeds_ahead
 from ferryid.draft.guessed_orders import guessed_orders
 from ferryid.draft.kinematics import navigation_signals
 from ferryid.draft.mapped import MappedSignal
@@ -117,8 +117,7 @@ def draft_profile(log: str | Path, like: Profile | None = None, ranges: TimeRang
         raise FerryIdError(
             f"{log}: {_nothing(topics)}, and names decide what is compared"
             f"{f'. By their values {shown}; which are orders no values show' if shown else ''}. Fix: "
-            f"{_RENAME if any(one.name == 'table' for one in topics) else ''}write the signal map by hand, see ferryid "
-            "vessel show --toml"
+            f"{_RENAME if any(one.name == 'table' for one in topics) else ''}{_BY_HAND}"
         )
     samples = read_samples(reader, wanted, str(log), ranges)
     looked_for = fields
@@ -130,8 +129,8 @@ def draft_profile(log: str | Path, like: Profile | None = None, ranges: TimeRang
     signals, motion = navigation_signals(groups, samples)
     if not signals:
         raise FerryIdError(
-            f"{log}: no field looks like a heading that changes, found {_listed([one.label for one in groups])}. Fix: record "
-            "the heading, or write the signal map by hand, see ferryid vessel show --toml"
+            f"{log}: no field looks like a heading that changes, found {_listed([one.label for one in groups])}"
+            f"{_courses(topics)}. Fix: record the heading, or {_BY_HAND}"
         )
     actuators = drafted_actuators(fields, samples, motion, driven.placements)
     if not actuators:
@@ -144,7 +143,7 @@ def draft_profile(log: str | Path, like: Profile | None = None, ranges: TimeRang
         )
         raise FerryIdError(
             f"{log}: {what}{''.join(f'; {one}' for one in driven.remarks)}. Fix: record "
-            f"{'while the vessel is driven' if still else 'the orders'}, or write the signal map by hand"
+            f"{'while the vessel is driven' if still else 'the orders'}, or {_BY_HAND}"
         )
     wind = wind_signal(winds, samples, motion)
     every = [*signals, *([] if wind is None else [wind]), *_tau_d(topics)]
@@ -210,8 +209,24 @@ def _left_over(
 _RENAME = 'name the columns after what they are, as in "N [m]", "psi [deg]", "u [m/s]", "r [deg/s]", "rpm", or '
 
 
+_BY_HAND = "write the signal map by hand; ferryid vessel show vtec-usv --toml prints one"
+
+
 def _nothing(topics: Sequence[Topic]) -> str:
     return f"no topic has a name of pose, velocity, heading or actuator, found {_listed(_fields(topics))}"
+
+
+def _courses(topics: Sequence[Topic]) -> str:
+    """Return that a course over ground is recorded, and that it is no heading; empty where none is."""
+    found = [
+        f"{topic.name}: {path}" for topic in topics for path, words in numeric_fields(topic).items()
+        if words[-1:] in (("track",), ("cog",), ("course",)) and not set(words) & (ORDERS | UNRELATED) and topic.count > 1
+    ]  # fmt: skip
+    return (
+        f"; {_listed(found)}: a course over ground, which differs from the heading where the vessel drifts"
+        if found
+        else ""
+    )
 
 
 def _fields(topics: Sequence[Topic]) -> list[str]:

@@ -99,7 +99,8 @@ RATES = frozenset(
         "rotational",
     ]
 )
-HEADING = frozenset({"heading", "hdg", "yaw", "psi", "compass", "hdt"})
+HEADING = frozenset({"heading", "hdg", "yaw", "psi", "compass", "hdt", "cap"})
+_GEODETIC = (("latitude", "longitude"), ("lat", "lon"), ("lat", "lng"), ("lat", "long"))
 _AHEAD = SPEEDS | {"u", "surge", "spd", "sog", "stw"}
 _OF_A_SPEED = frozenset({"water", "field"})
 """Words of what is no pose or velocity that the name of a speed has all the same: through the water, the field of a message."""
@@ -292,17 +293,18 @@ def _of_topic(topic: Topic, around: set[str], fields: Mapping[str, tuple[str, ..
             axes_of = slow if kind == "position" else every
             if {first, second} <= axes_of.keys():
                 found.append((kind, (axes_of[first], axes_of[second]), ""))
-    for names in (("latitude", "longitude"), ("lat", "lon"), ("lat", "lng"), ("lat", "long")):
+    for names in _GEODETIC:
         if set(names) <= every.keys():
             found.append(("position", (every[names[0]], every[names[1]]), "geodetic"))
             break
     alone = len(fields) == 1
+    plane = any(set(two) <= every.keys() for two in (("x", "y"), *_GEODETIC))
     for path, words in fields.items():
         said = set(words) | (around if alone else set())
         if said & HEADING and set(words) & SPEEDS:
             found.append(("yaw_rate", (path,), ""))
         elif (said & HEADING and not said & RATES and words[-1] not in ("x", "y", "z", "w", "d", "dot", "rate")) or (
-            words[-1] == "theta" and {"x", "y"} <= every.keys() and not {"psi", "yaw", "phi"} & every.keys()
+            words[-1] == "theta" and plane and not {"psi", "yaw", "phi"} & every.keys()
         ):
             found.append(("heading", (path,), ""))
         elif (said & RATES and (said & HEADING or words[0] in ("r", "z") or "zgyro" in said)) or words == ("r",):

@@ -210,7 +210,7 @@ def _part(variable: bytes, place: int, order: str) -> tuple[int, int, int, int]:
 
 def _check_parts(variable: bytes, order: str, begin: int, end: int) -> None:
     """Refuse a variable with a part that is longer than it, or of a type on which SciPy would crash (segmentation fault)."""
-    place, number, own_class, stated, inner = begin, 0, 0, 0, 0
+    place, number, flags, own_class, stated, inner = begin, 0, 0, 0, 0, 0
     while place + 8 <= end:
         kind, start, stop, following = _part(variable, place, order)
         if stop > end:
@@ -226,9 +226,21 @@ def _check_parts(variable: bytes, order: str, begin: int, end: int) -> None:
         elif number == 1 and own_class in (_CELL, _STRUCTURE, _OBJECT):
             stated = _count(variable[start:stop], order)
         place, number = following, number + 1
+    if number and number < (wanted := _fewest_parts(own_class, bool(flags & _COMPLEX))):
+        # What comes after the variable would be read in the place of its numbers.
+        raise ValueError(f"it has {counted(number, 'part')}, and its class needs {wanted}")
     if stated > max(inner, 1):
         # Room for all of them is made before the first is read.
         raise ValueError(f"it states {counted(stated, 'element')} and holds {inner}")
+
+
+def _fewest_parts(own_class: int, is_complex: bool) -> int:
+    """Return the parts of a variable: flags, dimensions and name, then its numbers, twice if complex, or its text.
+
+    Sparse ones have rows and columns before them; of other classes the elements are counted.
+    """
+    numbers = 1 + is_complex
+    return 3 + {_TEXT: 1, _SPARSE: 2 + numbers}.get(own_class, numbers if own_class in _NUMBERS else 0)
 
 
 def _count(dimensions: bytes, order: str) -> int:

@@ -65,9 +65,7 @@ def render(
         omitted=f"Not drawn, but part of every number: {', '.join(left)}." if left else "",
         labels=labels,
         coefficients=[_row(*row, labels, fitted) for row in comparison_words.coefficient_table(result)],
-        terms=[
-            _row(f"{row.term} in {row.axis}", row.unit, row.values, labels, fitted) for row in result.coefficients.terms
-        ],
+        terms=[_row(*row, labels, fitted) for row in comparison_words.term_table(result)],
         effects=[line.strip() for line in render_effects(result.effects)],
     )
     figures = [*overall, *(figure for section in sections for figure in section["figures"])]

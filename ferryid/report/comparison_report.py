@@ -70,15 +70,16 @@ def as_text(result: ComparisonResult) -> str:
 def _coefficient_table(result: ComparisonResult) -> list[str]:
     """Return the coefficients of every model, with their intervals where there is room for them."""
     narrow, fitted = len(result.labels) <= NARROW, comparison_words.estimated(result)
+    rows = comparison_words.physical_table(result)
     cells = {
-        label: [_with_interval(row.values[label], narrow, label in fitted) for row in result.coefficients.physical]
+        label: [_with_interval(values[label], narrow, label in fitted) for _, _, values in rows]
         for label in result.labels
     }
     columns = {label: max(12, 2 + max(map(len, (label, *column)))) for label, column in cells.items()}
     lines = [f"{'equations of motion':<18}" + "".join(f"{label:>{width}}" for label, width in columns.items())]
-    for number, row in enumerate(result.coefficients.physical):
+    for number, (name, unit, _) in enumerate(rows):
         line = "".join(f"{cells[label][number]:>{width}}" for label, width in columns.items())
-        lines.append(f"  {row.coefficient:<16}{line}  {row.unit}")
+        lines.append(f"  {name:<16}{line}  {unit}")
     held = f"; {comparison_words.HELD}: not estimated, as in the profile"
     shown = any(comparison_words.HELD in one for column in cells.values() for one in column)
     also = f"In parentheses: 95 % intervals{held if shown else ''}. T" if narrow else "Intervals, and t"

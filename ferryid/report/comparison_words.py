@@ -332,34 +332,43 @@ Values = tuple[str, str, Mapping[str, Coefficient]]
 
 def coefficient_table(result: ComparisonResult) -> list[Values]:
     """Return the coefficients of the equations of motion, and below them the terms that are no hull's."""
-    physical = result.coefficients.physical
-    labels = {label for row in physical for label in row.values}
+    rows = result.coefficients.terms
+    named = [(f"{_constant(row.term)} in {row.axis}", row) for row in rows if not is_of_a_hull(row.term, row.axis)]
+    return [*physical_table(result), *((name, row.unit, row.values) for name, row in named)]
+
+
+def physical_table(result: ComparisonResult) -> list[Values]:
+    """Return the coefficients of the equations of motion, but for those that no model has."""
+    rows = _without_rounding([(row.coefficient, row.unit, row.values) for row in result.coefficients.physical])
+    return [row for row in rows if any(cell(one)[0] != NONE for one in row[2].values())]
+
+
+def term_table(result: ComparisonResult) -> list[Values]:
+    """Return the terms of every axis as the models have them."""
+    return _without_rounding([(f"{row.term} in {row.axis}", row.unit, row.values) for row in result.coefficients.terms])
+
+
+def _without_rounding(rows: Sequence[Values]) -> list[Values]:
+    """Return rows with zero for what is nothing but rounding."""
+    labels = {label for _, _, values in rows for label in values}
     shown = {
         label: without_rounding(
             {
-                row.coefficient: np.array([one.value, one.low, one.high])
-                for row in physical
-                if (one := row.values.get(label)) is not None
+                name: np.array([one.value, one.low, one.high])
+                for name, _, values in rows
+                if (one := values.get(label)) is not None
             }
         )
         for label in labels
     }
-    rows: list[Values] = [
-        (
-            row.coefficient,
-            row.unit,
-            {label: Coefficient(*shown[label][row.coefficient].tolist()) for label in row.values},
-        )
-        for row in physical
+    return [
+        (name, unit, {label: Coefficient(*shown[label][name].tolist()) for label in values})
+        for name, unit, values in rows
     ]
-    rows += [
-        (f"{_constant(row.term)} in {row.axis}", row.unit, row.values)
-        for row in result.coefficients.terms
-        if not is_of_a_hull(row.term, row.axis)
-    ]
-    return rows
 
 
+NONE = "–"
+"""In the place of a coefficient that a model does not have."""
 HELD = "held"
 """In the place of the interval of a coefficient that a fit did not estimate."""
 
@@ -381,7 +390,7 @@ def cell(one: Coefficient | None, *, of_fit: bool = False) -> tuple[str, str]:
     `of_fit` is whether the others of its model have intervals: then one without any was held.
     """
     if one is None or (one.value == 0.0 and not _has_interval(one)):
-        return "–", ""
+        return NONE, ""
     if not _has_interval(one):
         return number(one.value, ".4g"), HELD if of_fit else ""
     return number(one.value, ".4g"), f"{number(one.low, '.4g')} to {number(one.high, '.4g')}"

@@ -19,6 +19,8 @@ from ferryid.report.evaluation_text import NOT_ACCEPTED
 from ferryid.types import AXES
 
 EVERYWHERE = "all along"
+LIKELY = 0.05
+"""Least probability of a hint that a headline names."""
 INCREDIBLE = 3.0
 """Standard deviations as of which a coefficient of the hull has moved farther than is credible."""
 NAMED_UNSEEN = 3
@@ -85,8 +87,8 @@ def headline(diagnosis: Diagnosis) -> str:
     """Return the verdict in one sentence."""
     every = [one for one in diagnosis.findings if one.effect != UNKNOWN]
     named = [one for one in every if one.sure]
-    hints = [uncapitalised(title(one.effect, one.instance)) for one in every if one not in named]
-    doubtful = listed(list(dict.fromkeys(hints)))
+    hints = list(dict.fromkeys(uncapitalised(title(one.effect, one.instance)) for one in every if likely_hint(one)))
+    doubtful = listed(hints)
     physics = [_sure_name(one) for one in named if one.effect in effects()]
     faulty = [one for one in named if _of_sensor(one)]
     sensors = _faults(faulty, [uncapitalised(title(one.effect)) for one in faulty])
@@ -113,7 +115,7 @@ def headline(diagnosis: Diagnosis) -> str:
         perhaps = f" Perhaps some of it is {doubtful}." if doubtful else ""
         return f"Unexplained: the recording differs from the {base}, and nothing known here surely accounts for it.{perhaps}"
     if diagnosis.verdict == "not_testable":
-        perhaps = f" Perhaps {doubtful} {'is' if len(every) == 1 else 'are'}." if doubtful else ""
+        perhaps = f" Perhaps {doubtful} {'is' if len(hints) == 1 else 'are'}." if doubtful else ""
         return f"Not testable: this log cannot show whether anything is missing from the {base}.{perhaps}"
     unseen = least_sizes.never_seen(diagnosis)
     if unseen:
@@ -161,9 +163,16 @@ def changed(shares: Mapping[str, float]) -> str:
     return " and ".join(parts) if parts or not shares else "stays as it was"
 
 
+def likely_hint(finding: Finding) -> bool:
+    """Tell whether a finding is a hint that is likely enough to be named in a headline."""
+    return not finding.sure and finding.probability >= LIKELY
+
+
 def said(finding: Finding) -> str:
-    """Return the sentence of a finding; a hint's begins with "Perhaps"."""
-    return finding.says if finding.sure else f"Perhaps: {finding.says}"
+    """Return the sentence of a finding; a hint's begins with "Perhaps", and one that is hardly likely with "Unlikely"."""
+    if finding.sure:
+        return finding.says
+    return f"{'Perhaps' if likely_hint(finding) else 'Unlikely'}: {finding.says}"
 
 
 def numbers(finding: Finding) -> str:
@@ -426,7 +435,7 @@ def summary(diagnoses: Sequence[Diagnosis]) -> str:
     faulty = [one for one in named if one.sure and _of_sensor(one)]
     sensors = _faults(faulty, [_sure_name(one, sizes=False) for one in faulty])
     unrecorded = sum(any(one.sure and one.effect == UNRECORDED for one in each.findings) for each in diagnoses)
-    doubtful = dict.fromkeys(uncapitalised(title(one.effect, one.instance)) for one in named if not one.sure)
+    doubtful = dict.fromkeys(uncapitalised(title(one.effect, one.instance)) for one in named if likely_hint(one))
     known = {uncapitalised(name) for one in named if one.sure for name in _called(one)}
     perhaps = [one for one in doubtful if one not in known]
     parts = [f"Of {counted(len(diagnoses), 'log')}, {listed(counts)}."]

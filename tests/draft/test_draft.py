@@ -256,13 +256,18 @@ def test_the_velocity_that_agrees_is_taken_and_the_others_are_named(tmp_path: Pa
             ("t", "N", "E", "u", "v", "rudder", "n"),
             "no field looks like a heading that changes.* Fix: record the heading",
         ),
+        (
+            ("t", "N", "E", "track", "still_cap", "track_ref", "n"),
+            r"heading that changes, found .*table: still_cap; table: track: a course over ground, which differs from the "
+            r"heading where the vessel drifts\. Fix: .* ferryid vessel show vtec-usv --toml",
+        ),
         (("t", "N", "E", "psi", "u", "v", "r"), "no field looks like an actuator.* Fix: record the orders"),
         (("t", "level", "flag"), "no topic has a name of pose, velocity, heading or actuator"),
     ],
 )
 def test_a_log_that_lacks_what_is_needed(tmp_path: Path, columns: tuple[str, ...], told: str) -> None:
     c = sailed(60.0)
-    c |= {"level": c["n"], "flag": c["u"]}
+    c |= {"level": c["n"], "flag": c["u"], "track": c["psi"], "track_ref": c["psi"], "still_cap": 0.0 * c["t"]}
     with pytest.raises(FerryIdError, match=told):
         draft_profile(table(tmp_path, {name: c[name] for name in columns}))
 
@@ -684,6 +689,15 @@ def test_a_letter_is_a_side_only_beside_its_other_side(tmp_path: Path) -> None:
     assert [one.name for one in draft.actuators] == ["propeller"]
 
 
+@pytest.mark.parametrize("name", ["theta", "cap"])
+def test_headings_of_other_tongues_beside_latitude_and_longitude(tmp_path: Path, name: str) -> None:
+    c = in_latitude_and_enu(sailed())
+    _, found = drafted(
+        tmp_path, {**{each: c[each] for each in ("t", "latitude", "longitude", "rudder", "rpm")}, name: sailed()["psi"]}
+    )
+    assert found["heading"].fields == (name,)
+
+
 @pytest.mark.parametrize(
     ("columns", "names"),
     [
@@ -691,6 +705,9 @@ def test_a_letter_is_a_side_only_beside_its_other_side(tmp_path: Path) -> None:
         (("thr_left", "thr_right"), ["left", "right"]),
         (("left_thr", "right_thr"), ["left", "right"]),
         (("motor_l", "motor_r"), ["left", "right"]),
+        (("motl", "motr"), ["left", "right"]),
+        (("cmdl", "cmdr"), ["left", "right"]),
+        (("cmd_l", "cmd_r"), ["left", "right"]),
         (("servo1_raw", "servo3_raw"), ["output1", "output3"]),
         (("T1", "T2"), ["actuator1", "actuator2"]),
         (("u1", "u2"), ["actuator1", "actuator2"]),

@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 import pytest
 import scipy.io
+import scipy.sparse
 from scipy.io.matlab import MatlabOpaque
 
 from ferryid.errors import FerryIdError
@@ -189,6 +190,32 @@ def test_a_type_that_there_is_not_is_a_loss_and_no_crash(tmp_path: Path, kind: i
     assert sorted(log.topics[0].fields) == ["r", "u"]
     (loss,) = log.losses
     assert f"has type {kind}, not one of its class" in loss.what
+
+
+def test_numbers_that_are_said_to_be_complex_are_a_loss_and_no_crash(tmp_path: Path) -> None:
+    path = saved(tmp_path, {"a": {"t": T, "u": U}, "b": {"t": T, "u": R}})
+    content = bytearray(path.read_bytes())
+    # The flags of the time in the second structure, which another variable follows in the place of imaginary parts.
+    at = content.index(struct.pack("<III", 6, 8, 6), content.rindex(struct.pack("<III", 6, 8, 2)))
+    struct.pack_into("<I", content, at + 8, 6 | 0x800)
+    path.write_bytes(content)
+    log = open_log(path)
+    assert [sorted(topic.fields) for topic in log.topics] == [["u"]]
+    (loss,) = log.losses
+    assert "it has 4 parts, and its class needs 5" in loss.what
+
+
+def test_what_is_empty_or_complex_or_sparse_costs_nothing(tmp_path: Path) -> None:
+    others = {
+        "none": np.zeros((0, 0)),
+        "text": "",
+        "z": np.array([1 + 2j]),
+        "sparse": scipy.sparse.csc_matrix(np.eye(3)),
+    }
+    for inner in (others, {"s": others}, {"c": _cells(np.zeros((0, 0)), "", 1j)}):
+        log = open_log(saved(tmp_path, {"t": T, "u": U, **inner}))
+        assert sorted(log.topics[0].fields) == ["u"]
+        assert not log.losses
 
 
 def test_more_structures_than_there_are_need_no_memory(tmp_path: Path) -> None:

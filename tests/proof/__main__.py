@@ -27,8 +27,8 @@ from ferryid.validation.recorded.scores import RecordedScores, from_twice_distin
 from ferryid.validation.records import DIAGNOSED
 from ferryid.validation.rival_scores import RivalScores
 from ferryid.validation.scores import Detection, Scores
-from ferryid.validation.source_hash import source_hash
-from tests.evidence import ROOT, stamp
+from ferryid.validation.source_hash import EVALUATION, source_hash
+from tests.evidence import ROOT, ages, stamp
 from tests.real import withheld
 
 REPORTS = ROOT / "reports"
@@ -134,7 +134,7 @@ class Part:
             ),
             f"a name that is not in the trial in {scores.false_names['all'].text}",
             ON_TRIALS,
-            _sources(result),
+            _sources(SIMULATED, result),
         )
         cells = {
             one.cell: (f"{sum(one.blind_named)}/{len(one.blind_named)}", one.blind.text, few(_from_twice(one)))
@@ -155,7 +155,7 @@ class Part:
             f"the day {sea.winds_from_twice.text}",
             f"a name that is not in the logs in {sea.false.text}",
             ON_CAMPAIGNS,
-            _sources(result),
+            _sources(SEA, result),
         )
         return cls("at sea, simulated", dict(zip(QUESTIONS, said, strict=True)), page(result, scores), {})
 
@@ -176,7 +176,7 @@ class Part:
             + (f"; of what changed between two groups of recordings {changed.text} of all sizes" if changed.of else ""),
             f"a name neither concealed nor in the recording as it was in {scores.wrong.text}",
             f"{', '.join(one.recording for one in scores.unaltered)}, their records changed so that the effect explains them",
-            _sources(result),
+            _sources(REAL, result),
         )
         cells = {}
         for effect in dict.fromkeys(one.effect for one in scores.responses if one.named):
@@ -246,9 +246,17 @@ def _rivals(parts: Sequence[Part]) -> list[str]:
     return ["", RIVALS, *rows] if rows else []
 
 
-def _sources(result: Result) -> str:
-    same = "the present ones" if result["sources"] == source_hash() else "older than the present ones"
+def _sources(name: str, result: Result) -> str:
+    same = "the present ones" if result["sources"] == source_hash() else f"older than the present ones{_in(name)}"
     return f"`{result['sources']}` of version {result['ferryid_version']} ({same}), `{command(result)}`"
+
+
+def _in(name: str) -> str:
+    """Return in which folders that a diagnosis depends on the sources have changed since a result was made."""
+    changed = [folder for age in ages() if age.page == f"reports/{name}" for folder in age.changed]
+    every = [folder for folder in changed if folder.startswith("ferryid")]
+    inside = [one for one in every if not f"{one.removeprefix('ferryid/')}/".startswith(EVALUATION)]
+    return f", which differ in {', '.join(inside)}" if inside else ""
 
 
 def _from_twice(one: Detection) -> Share:

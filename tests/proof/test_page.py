@@ -9,6 +9,8 @@ import pytest
 
 from ferryid.validation.plant.effects import plant_effects
 from ferryid.validation.recorded.effects import concealments
+from tests.evidence import Age
+from tests.proof import __main__ as made
 from tests.proof.__main__ import PAGE, QUESTIONS, REAL, REPORTS, SEA, SIMULATED, WHY, joint_page, main
 
 
@@ -28,6 +30,14 @@ def test_the_first_ten_lines_answer_what_a_sceptic_asks() -> None:
             assert "simulated: " in line
             assert "real recordings: " in line
     assert f"`{stored(SIMULATED)['sources']}`" in "".join(first)
+
+
+def test_a_draw_of_older_sources_tells_where_they_differ(monkeypatch: pytest.MonkeyPatch) -> None:
+    changed = ("ferryid/diagnose/data", "ferryid/report", "tests/real")
+    monkeypatch.setattr(made, "ages", lambda: (Age(f"reports/{SIMULATED}", "2026-12-01", changed),))
+    old = {**stored(SIMULATED), "sources": "0" * 16}
+    (line,) = [one for one in joint_page(old, stored(REAL)).splitlines() if "**Made by which sources?**" in one]
+    assert "(older than the present ones, which differ in ferryid/diagnose/data), `ferryid prove" in line
 
 
 @pytest.mark.parametrize("name", [SIMULATED, REAL])

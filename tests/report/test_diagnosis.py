@@ -259,6 +259,14 @@ def test_a_verdict_is_told_with_what_changed() -> None:
     assert headline(diagnosis("matched")).startswith("Matched: nothing")
 
 
+def test_a_headline_names_no_hint_that_is_hardly_likely() -> None:
+    for probability, told in ((0.06, " Perhaps some of it is steady wind."), (0.04, "")):
+        one = replace(diagnosis("unexplained"), findings=(replace(wind(), probability=probability),))
+        assert headline(one).endswith(f"surely accounts for it.{told}")
+        campaign = summary([one, replace(one, log="other")])
+        assert ("Perhaps the model left out steady wind." in campaign) == bool(told)
+
+
 def test_the_verdict_does_not_call_a_fault_corrected_that_is_left_as_it_is() -> None:
     assert NOT_CORRECTED in inspect.getsource(clock_offset.find)
     offset = replace(wind(), effect="clock_offset", unresolved_with=(), says="Position lags velocity by 0.21 s.")
@@ -410,6 +418,7 @@ def test_a_finding_is_told_in_numbers() -> None:
     assert where(passed).startswith("It began at 312 s and ended at 500 s, and shows")
     assert where(replace(passed, onset_s=None)).startswith("It ended at 500 s, and shows")
     assert said(replace(wind(), probability=0.4)).startswith("Perhaps: ")
+    assert said(replace(wind(), probability=0.04)).startswith("Unlikely: ")
     assert said(wind()) == wind().says
     assert trust(wind()) == (
         "Probability above 0.99, among the effects that were tried. With it, the squared force error on data that it was not "
