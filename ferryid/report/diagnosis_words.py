@@ -110,7 +110,8 @@ def headline(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "explained":
         return f"Explained: {names}{more}."
     if diagnosis.verdict == "partly_explained":
-        return " ".join([f"Partly explained: {names}{more}.", *_rest(diagnosis)])
+        rest = _rest(diagnosis) if doubtful else _rest(diagnosis) or _unlikely(every)
+        return " ".join([f"Partly explained: {names}{more}.", *rest])
     if diagnosis.verdict == "unexplained":
         perhaps = f" Perhaps some of it is {doubtful}." if doubtful else ""
         return f"Unexplained: the recording differs from the {base}, and nothing known here surely accounts for it.{perhaps}"
@@ -142,6 +143,12 @@ def _rest(diagnosis: Diagnosis) -> list[str]:
     if not diagnosis.remainder.testable:
         parts.append(f"Whether {'that is all' if unknown or much else 'more is missing'}, this log cannot show.")
     return parts
+
+
+def _unlikely(findings: Sequence[Finding]) -> list[str]:
+    """Return what alone keeps a log from being explained, as a sentence: hints that are hardly likely."""
+    open_ = [uncapitalised(title(one.effect, one.instance)) for one in findings if not one.sure]
+    return [f"Whether {listed(list(dict.fromkeys(open_)))} is missing too, is open, though unlikely."] if open_ else []
 
 
 def _without_a_name(what: str, findings: Sequence[Finding]) -> str:

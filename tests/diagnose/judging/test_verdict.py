@@ -16,7 +16,7 @@ from ferryid.diagnose.judging.finding import UNKNOWN, Finding
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.judging.verdict import VERDICTS, Remainder, campaign_verdict, verdict_of, worse_axes
 from ferryid.effects import effects
-from ferryid.report.diagnosis_words import UNRECORDED, headline, summary, title
+from ferryid.report.diagnosis_words import UNRECORDED, headline, likely_hint, summary, title
 from ferryid.types import AXES
 from tests.diagnose.judging.findings import found
 
@@ -149,8 +149,11 @@ def test_no_sentence_contradicts_findings_and_figures(one: Diagnosis) -> None:
     assert says.startswith(("Explained", "Partly explained")) == bool(named)
     for finding in one.findings:
         name = title(finding.effect)
-        if finding.effect != UNKNOWN and not finding.sure and name[1:] in says:
+        if finding.effect != UNKNOWN and likely_hint(finding) and name[1:] in says:
             assert re.search(rf"[Pp]erhaps.*{name[1:]}", says), "a hint is told as one"
+    if says.startswith("Partly explained") and not one.remainder.eliminated:
+        told = ("perhaps", "Perhaps", "unlikely", "More is missing", "cannot show", "larger", "is left over")
+        assert any(word in says for word in told), "why it is explained in part is told"
     if "falls by" in says:
         for axis in one.remainder.worse:
             assert re.search(rf"rises by [^;.]*{axis}", says), f"{axis} gets worse, which is not said"
@@ -173,7 +176,7 @@ def test_no_sentence_on_several_logs_contradicts_them(logs: list[Diagnosis]) -> 
     assert ("a force acted that was not recorded" in says) == any(one.effect == UNRECORDED for one in named)
     if verdict == "explained":
         assert {one.verdict for one in logs} <= {"explained", "matched", "not_testable"}
-    for name, hints in ((title(one.effect), not one.sure) for one in every if one.effect != UNKNOWN):
+    for name, hints in ((title(one.effect), likely_hint(one)) for one in every if one.effect != UNKNOWN):
         if hints and name[1:] not in says.partition("Perhaps")[0]:
             assert name[1:] in says.partition("Perhaps")[2]
 
