@@ -110,7 +110,7 @@ def headline(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "explained":
         return f"Explained: {names}{more}."
     if diagnosis.verdict == "partly_explained":
-        rest = _rest(diagnosis) if doubtful else _rest(diagnosis) or _unlikely(every)
+        rest = _rest(diagnosis) or ([] if doubtful else _unlikely(every))
         return " ".join([f"Partly explained: {names}{more}.", *rest])
     if diagnosis.verdict == "unexplained":
         perhaps = f" Perhaps some of it is {doubtful}." if doubtful else ""
@@ -147,8 +147,8 @@ def _rest(diagnosis: Diagnosis) -> list[str]:
 
 def _unlikely(findings: Sequence[Finding]) -> list[str]:
     """Return what alone keeps a log from being explained, as a sentence: hints that are hardly likely."""
-    open_ = [uncapitalised(title(one.effect, one.instance)) for one in findings if not one.sure]
-    return [f"Whether {listed(list(dict.fromkeys(open_)))} is missing too, is open, though unlikely."] if open_ else []
+    named = dict.fromkeys(uncapitalised(title(one.effect, one.instance)) for one in findings if not one.sure)
+    return [f"Unlikely, but not excluded: {listed(list(named))}."] if named else []
 
 
 def _without_a_name(what: str, findings: Sequence[Finding]) -> str:

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 import tempfile
-import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from tests.bench.campaigns import LOGS_GOAL_S
+from tests.bench.diagnosis import LENGTHS_S
+from tests.bench.long import DIAGNOSIS_S, LARGEST_GB
+from tests.bench.processes import whole_process
 from tests.real.places import DATA
 
-HOUR_S, HOURS, HOURS_S = 45.0, 6.0, 240.0
-"""Aimed at for a log of an hour, and for one of `HOURS`, and in proportion between them."""
-CAMPAIGN_S = 60.0
-"""Aimed at for a campaign of 18 logs of 12 minutes."""
-MEMORY_GB = 2.0
+HOUR_S, SIX_HOURS_S = LENGTHS_S[3600], DIAGNOSIS_S
+"""Aimed at for a log of an hour and for one of six, as on simulated logs, and in proportion between them."""
 
 HEAD = """
 ## Time and memory
@@ -40,17 +37,17 @@ class Timed:
 
     def row(self) -> str:
         """Return it as a row of the table."""
-        reached = self.seconds <= self.aim_s and self.memory_gb <= MEMORY_GB
+        reached = self.seconds <= self.aim_s and self.memory_gb <= LARGEST_GB
         return (
             f"| {self.title} | {self.lasted_s / 3600.0:.2f} h | {self.seconds:.0f} s | {self.aim_s:.0f} s "
-            f"| {self.memory_gb:.2f} | {MEMORY_GB:g} | {'reached' if reached else '**missed**'} |"
+            f"| {self.memory_gb:.2f} | {LARGEST_GB:g} | {'reached' if reached else '**missed**'} |"
         )
 
 
 def section() -> str:
     """Return the section on time and memory."""
     rows = [
-        timed("Esso Osaka, all 18 runs", "esso_osaka/*/*.csv", "esso-osaka", CAMPAIGN_S),
+        timed("Esso Osaka, all 18 runs", "esso_osaka/*/*.csv", "esso-osaka", LOGS_GOAL_S),
         timed("Gunnerus, manoeuvres at sea", "gunnerus/RVG_ManeuveringTests.csv", "gunnerus"),
     ]
     return "\n".join([HEAD, *(row.row() for row in rows)])
@@ -61,26 +58,13 @@ def timed(title: str, pattern: str, vessel: str, aim_s: float = 0.0) -> Timed:
     logs = [str(path) for path in sorted(DATA.glob(pattern))]
     with tempfile.TemporaryDirectory() as out:
         found = Path(out) / "found.json"
-        began = time.monotonic()
-        with subprocess.Popen(
-            [
-                *(str(Path(sys.executable).with_name("ferryid")), "diagnose", *logs, "--vessel", vessel),
-                *("--out", out, "--json", str(found)),
-            ],
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        ) as process:
-            _, status, usage = os.wait4(process.pid, 0)
-            process.returncode = os.waitstatus_to_exitcode(status)
-        seconds = time.monotonic() - began
-        assert process.returncode == 0, f"{title}: exit code {process.returncode}"
+        seconds, peak = whole_process(["diagnose", *logs, "--vessel", vessel, "--out", out, "--json", str(found)])
         made = json.loads(found.read_text(encoding="utf-8"))
     lasted = sum(float(one["duration_s"]) for one in made.get("logs", [made]))
-    # Kilobytes in Linux.
-    return Timed(title, seconds, usage.ru_maxrss * 1e-6, lasted, aim_s or single_log_s(lasted))
+    return Timed(title, seconds, peak * 1e-9, lasted, aim_s or single_log_s(lasted))
 
 
 def single_log_s(lasted_s: float) -> float:
     """Return what a diagnosis of one log may take [s]: in proportion up to an hour, and between the aims after it."""
     hours = lasted_s / 3600.0
-    return hours * HOUR_S if hours <= 1.0 else HOUR_S + (hours - 1.0) / (HOURS - 1.0) * (HOURS_S - HOUR_S)
+    return hours * HOUR_S if hours <= 1.0 else HOUR_S + (hours - 1.0) / 5.0 * (SIX_HOURS_S - HOUR_S)

@@ -28,7 +28,7 @@ from ferryid.diagnose.judging.error_profiles import profile_of
 from ferryid.diagnose.judging.finding import Finding, LawTerm, Rival
 from ferryid.diagnose.judging.least_sizes import LeastSize
 from ferryid.diagnose.judging.locate import Location
-from ferryid.diagnose.judging.verdict import VERDICTS
+from ferryid.diagnose.judging.verdict import VERDICTS, Remainder
 from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.errors import FerryIdError
@@ -265,6 +265,10 @@ def test_a_headline_names_no_hint_that_is_hardly_likely() -> None:
         assert headline(one).endswith(f"surely accounts for it.{told}")
         campaign = summary([one, replace(one, log="other")])
         assert ("Perhaps the model left out steady wind." in campaign) == bool(told)
+    # It may be all that keeps a log from being explained.
+    hint = replace(wind(), probability=0.04)
+    one = replace(diagnosis("partly_explained"), findings=(gain(), hint), remainder=Remainder())
+    assert headline(one).endswith(" Unlikely, but not excluded: steady wind.")
 
 
 def test_the_verdict_does_not_call_a_fault_corrected_that_is_left_as_it_is() -> None:

@@ -152,7 +152,7 @@ def test_no_sentence_contradicts_findings_and_figures(one: Diagnosis) -> None:
         if finding.effect != UNKNOWN and likely_hint(finding) and name[1:] in says:
             assert re.search(rf"[Pp]erhaps.*{name[1:]}", says), "a hint is told as one"
     if says.startswith("Partly explained") and not one.remainder.eliminated:
-        told = ("perhaps", "Perhaps", "unlikely", "More is missing", "cannot show", "larger", "is left over")
+        told = ("perhaps", "Perhaps", "Unlikely", "More is missing", "cannot show", "larger", "is left over")
         assert any(word in says for word in told), "why it is explained in part is told"
     if "falls by" in says:
         for axis in one.remainder.worse:
